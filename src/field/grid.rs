@@ -1,0 +1,127 @@
+//! The only code that turns sample indexes into metres and cycles per metre.
+
+use crate::error::{Error, Result};
+
+/// A rectangular lattice of samples on a plane of constant z.
+///
+/// The lattice is centred on `center`: column `c` stands at x = center.x + (c − (width−1)/2)·pitch_x and row `r` at
+/// y = center.y + ((height−1)/2 − r)·pitch_y, so row 0 is on top. A pixel is the cell round its sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    /// Number of columns.
+    pub width: usize,
+    /// Number of rows.
+    pub height: usize,
+    /// Distance of neighbouring columns [m].
+    pub pitch_x: f64,
+    /// Distance of neighbouring rows [m].
+    pub pitch_y: f64,
+    /// Middle of the lattice in the hologram frame, (x, y) [m].
+    pub center: [f64; 2],
+}
+
+impl Grid {
+    /// A centred grid; refuses an empty one and a pitch that is not positive and finite.
+    pub fn new(width: usize, height: usize, pitch_x: f64, pitch_y: f64) -> Result<Self> {
+        if width == 0 || height == 0 {
+            return Err(Error::parameter("size", format!("{width}×{height} has no pixels")));
+        }
+        // 2³² samples are 34 GB of complex64: larger fields are streamed as tiles, never held.
+        if width.checked_mul(height).is_none_or(|n| n > 1 << 32) {
+            return Err(Error::parameter("size", format!("{width}×{height} is too large for one field")));
+        }
+        for pitch in [pitch_x, pitch_y] {
+            if !(pitch.is_finite() && pitch > 0.0) {
+                return Err(Error::parameter("pitch", format!("{pitch} m must be greater than zero and finite")));
+            }
+        }
+        Ok(Self { width, height, pitch_x, pitch_y, center: [0.0; 2] })
+    }
+    /// The same lattice about another middle [m].
+    pub fn centered_at(mut self, center: [f64; 2]) -> Self {
+        self.center = center;
+        self
+    }
+    /// Number of samples.
+    #[allow(clippy::len_without_is_empty)] // a grid has at least one sample
+    pub fn len(&self) -> usize {
+        self.width * self.height
+    }
+    /// Position of a column [m].
+    pub fn x(&self, column: usize) -> f64 {
+        self.center[0] + (column as f64 - (self.width as f64 - 1.0) * 0.5) * self.pitch_x
+    }
+    /// Position of a row [m]; falls as the row rises.
+    pub fn y(&self, row: usize) -> f64 {
+        self.center[1] + ((self.height as f64 - 1.0) * 0.5 - row as f64) * self.pitch_y
+    }
+    /// The (fractional) column that stands at x [m]: inverse of [`Grid::x`].
+    pub fn column(&self, x: f64) -> f64 {
+        (x - self.center[0]) / self.pitch_x + (self.width as f64 - 1.0) * 0.5
+    }
+    /// The (fractional) row that stands at y [m]: inverse of [`Grid::y`].
+    pub fn row(&self, y: f64) -> f64 {
+        (self.height as f64 - 1.0) * 0.5 - (y - self.center[1]) / self.pitch_y
+    }
+    /// Full width, pixels included [m].
+    pub fn extent_x(&self) -> f64 {
+        self.width as f64 * self.pitch_x
+    }
+    /// Full height, pixels included [m].
+    pub fn extent_y(&self) -> f64 {
+        self.height as f64 * self.pitch_y
+    }
+    /// Spatial frequency of transform column `k` [cycles/m]: k/(width·pitch) for the lower half, negative above.
+    pub fn frequency_x(&self, k: usize) -> f64 {
+        signed(k, self.width) / (self.width as f64 * self.pitch_x)
+    }
+    /// Spatial frequency along +y of transform row `k` [cycles/m]. Rows run downwards, so it is −k/(height·pitch)
+    /// for the lower half: exp(+i2π·f_y·y) has its transform there.
+    pub fn frequency_y(&self, k: usize) -> f64 {
+        -signed(k, self.height) / (self.height as f64 * self.pitch_y)
+    }
+    /// Highest |f_x| that the lattice carries: 1/(2·pitch_x) [cycles/m].
+    pub fn limit_x(&self) -> f64 {
+        0.5 / self.pitch_x
+    }
+    /// Highest |f_y| that the lattice carries: 1/(2·pitch_y) [cycles/m].
+    pub fn limit_y(&self) -> f64 {
+        0.5 / self.pitch_y
+    }
+}
+
+/// Index of a discrete transform as a signed number of cycles: −⌊n/2⌋ … ⌈n/2⌉−1.
+fn signed(k: usize, n: usize) -> f64 {
+    if k < n.div_ceil(2) { k as f64 } else { k as f64 - n as f64 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lattice_is_centred_with_row_0_on_top() {
+        let grid = Grid::new(4, 3, 2.0, 3.0).expect("grid");
+        assert_eq!([0, 1, 2, 3].map(|c| grid.x(c)), [-3.0, -1.0, 1.0, 3.0]);
+        assert_eq!([0, 1, 2].map(|r| grid.y(r)), [3.0, 0.0, -3.0]);
+        let grid = grid.centered_at([10.0, -5.0]);
+        for i in 0..3 {
+            assert_eq!(grid.column(grid.x(i)), i as f64);
+            assert_eq!(grid.row(grid.y(i)), i as f64);
+        }
+    }
+
+    #[test]
+    fn frequencies_are_the_exact_transform_grid() {
+        let grid = Grid::new(4, 5, 0.5, 1.0).expect("grid");
+        assert_eq!([0, 1, 2, 3].map(|k| grid.frequency_x(k)), [0.0, 0.5, -1.0, -0.5]);
+        assert_eq!([0, 1, 2, 3, 4].map(|k| grid.frequency_y(k)), [0.0, -0.2, -0.4, 0.4, 0.2]);
+    }
+
+    #[test]
+    fn degenerate_grids_are_refused() {
+        for (w, h, p) in [(0, 1, 1.0), (1, 0, 1.0), (1, 1, 0.0), (1, 1, f64::NAN), (1 << 20, 1 << 20, 1.0)] {
+            assert!(Grid::new(w, h, p, 1.0).is_err());
+        }
+    }
+}

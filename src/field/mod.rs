@@ -1,0 +1,91 @@
+//! The scalar light field on a plane: complex samples on a [`Grid`] at one wavelength.
+
+pub mod fft;
+pub mod grid;
+pub mod npy;
+
+pub use fft::Fft2;
+pub use grid::Grid;
+pub use num_complex::{Complex, Complex32, Complex64};
+
+use crate::error::{Error, Result};
+
+/// Complex amplitude of a monochromatic scalar wave, sampled on the plane of its grid.
+///
+/// Row-major, row 0 on top (largest y), `width × height` samples. The time factor is exp(−iωt), so a longer optical
+/// path is a larger phase; intensity is |u|², in units of the points' radiance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Field<T = f32> {
+    /// Where the samples stand.
+    pub grid: Grid,
+    /// Vacuum wavelength λ [m].
+    pub wavelength: f64,
+    /// Samples u, row-major, `grid.len()` of them.
+    pub samples: Vec<Complex<T>>,
+}
+
+impl<T: num_complex::ComplexFloat + Copy> Field<T>
+where
+    Complex<T>: Copy,
+    T: From<f32>,
+{
+    /// The dark field.
+    pub fn zeros(grid: Grid, wavelength: f64) -> Self {
+        let zero: T = 0f32.into();
+        Self { grid, wavelength, samples: vec![Complex { re: zero, im: zero }; grid.len()] }
+    }
+}
+
+impl Field<f32> {
+    /// A field from its samples; refused when their number is not the grid's.
+    pub fn new(grid: Grid, wavelength: f64, samples: Vec<Complex32>) -> Result<Self> {
+        if samples.len() != grid.len() {
+            let what = format!("{} samples for a grid of {}×{}", samples.len(), grid.width, grid.height);
+            return Err(Error::parameter("field", what));
+        }
+        Ok(Self { grid, wavelength, samples })
+    }
+    /// Wavenumber k = 2π/λ [rad/m].
+    pub fn wavenumber(&self) -> f64 {
+        std::f64::consts::TAU / self.wavelength
+    }
+    /// Σ|u|², without the pixel's area: what a unitary step keeps.
+    pub fn energy(&self) -> f64 {
+        self.samples.iter().map(|u| f64::from(u.norm_sqr())).sum()
+    }
+    /// |u|² at each sample.
+    pub fn intensity(&self) -> Vec<f32> {
+        self.samples.iter().map(Complex::norm_sqr).collect()
+    }
+    /// The same samples in double precision.
+    pub fn to_f64(&self) -> Field<f64> {
+        let samples = self.samples.iter().map(|u| Complex64::new(u.re.into(), u.im.into())).collect();
+        Field { grid: self.grid, wavelength: self.wavelength, samples }
+    }
+}
+
+impl Field<f64> {
+    /// The same samples rounded to single precision.
+    pub fn to_f32(&self) -> Field<f32> {
+        let samples = self.samples.iter().map(|u| Complex32::new(u.re as f32, u.im as f32)).collect();
+        Field { grid: self.grid, wavelength: self.wavelength, samples }
+    }
+}
+
+/// Relative L2 distance of complex fields, √(Σ|a−b|² / Σ|b|²); phases count, so a global sign or piston shows.
+///
+/// Infinite when `b` is dark and `a` is not, zero when both are.
+pub fn relative_error<A, B>(a: &[Complex<A>], b: &[Complex<B>]) -> f64
+where
+    A: Copy + Into<f64>,
+    B: Copy + Into<f64>,
+{
+    assert_eq!(a.len(), b.len(), "fields of one size are compared");
+    let (mut difference, mut norm) = (0.0, 0.0);
+    for (a, b) in a.iter().zip(b) {
+        let (re, im): (f64, f64) = (b.re.into(), b.im.into());
+        difference += (a.re.into() - re).powi(2) + (a.im.into() - im).powi(2);
+        norm += re * re + im * im;
+    }
+    if difference == 0.0 { 0.0 } else { (difference / norm).sqrt() }
+}

@@ -1,0 +1,70 @@
+//! Files that appear whole or not at all.
+
+use crate::error::{Error, Result};
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Numbers partial files, so that two threads that write the same name do not share one.
+static PARTIAL: AtomicU64 = AtomicU64::new(0);
+
+/// Writes `path` through `fill`: into a partial file beside it, synced, then renamed over `path`.
+///
+/// If `fill` or the disk fails, the partial file is removed and what stood at `path` before is untouched.
+pub fn write_whole(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
+    let partial = partial_name(path);
+    let written = (|| {
+        let file = File::create(&partial).map_err(Error::io(path))?;
+        let mut writer = BufWriter::with_capacity(1 << 20, file);
+        fill(&mut writer)?;
+        writer.flush().map_err(Error::io(path))?;
+        let file = writer.into_inner().map_err(|e| Error::Io { path: path.into(), source: e.into_error() })?;
+        file.sync_all().map_err(Error::io(path))?;
+        drop(file);
+        fs::rename(&partial, path).map_err(Error::io(path))
+    })();
+    if written.is_err() {
+        // The first error is the one to report; a partial file that cannot be removed either changes nothing.
+        let _ = fs::remove_file(&partial);
+    }
+    written
+}
+
+/// Writes `bytes` as the whole content of `path`.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_whole(path, |w| w.write_all(bytes).map_err(Error::io(path)))
+}
+
+/// Makes the folder `path` if it is not there, and proves that files can be written in it.
+pub fn output_folder(path: &Path) -> Result<()> {
+    fs::create_dir_all(path).map_err(Error::io(path))?;
+    let probe = partial_name(&path.join("probe"));
+    File::create(&probe).map_err(Error::io(path))?;
+    fs::remove_file(&probe).map_err(Error::io(path))
+}
+
+fn partial_name(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let number = PARTIAL.fetch_add(1, Ordering::Relaxed);
+    path.with_file_name(format!(".{name}.{}-{number}.partial", std::process::id()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_no_partial() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("a.txt");
+        write_bytes(&path, b"old").expect("first write");
+        let failed = write_whole(&path, |w| {
+            w.write_all(b"half").map_err(Error::io(&path))?;
+            Err(Error::Interrupted)
+        });
+        assert!(matches!(failed, Err(Error::Interrupted)));
+        assert_eq!(fs::read(&path).expect("read"), b"old");
+        assert_eq!(fs::read_dir(folder.path()).expect("list").count(), 1);
+    }
+}

@@ -1,0 +1,49 @@
+//! # holodrive: from a glTF room to light on a panel
+//!
+//! A holographic display driver for spatial light modulators. Data goes one way, and each step hands on one type:
+//!
+//! ```text
+//! glTF ──scene──▶ Scene ──illumination──▶ light on surfaces ──points──▶ PointCloud ──hologram──▶ Field
+//!   Field ──encode──▶ PhasePattern | FringePattern ──panel──▶ Frame (drive levels) ──▶ display
+//!   Frame ──panel::simulated──▶ Field ──reconstruction──▶ what an eye or a sensor sees, with figures
+//! ```
+//!
+//! Every arrow can be entered or left through a file, so each step is useful alone.
+//!
+//! # Conventions
+//!
+//! *Frame.* The hologram frame is glTF camera space: metres, right-handed, +x right, +y up, +z towards the viewer. The
+//! panel is the plane z = 0, centred. Points behind it have z < 0, points in front of it z > 0.
+//!
+//! *Wave.* The time factor is exp(−iωt); a diverging wave is exp(+ikr)/r; a longer path is a larger phase. A point
+//! behind the panel sends exp(+ikr)/r through it; at a point in front the wave converges, exp(−ikr)/r on the panel.
+//! Light travels towards +z: [`propagation`] over a distance d > 0 multiplies each plane wave by exp(+i2πf_z·d).
+//!
+//! *Transform.* Forward exp(−i2πfx), 1/N on the inverse ([`field::fft`] only). *Rows*: row-major, row 0 on top.
+//! Index ↔ metre ↔ cycles/m conversions stand in [`field::grid`] only.
+//!
+//! *Units.* SI f64 inside, documented in square brackets, never part of a name; at the border ([`units`]) a length or
+//! angle without a unit is an error. *Transforms* are named destination first: `hologram_from_world`.
+//!
+//! *Precision.* Directions, radiance and the BVH in f32; positions of point sources and every optical path in f64 (or
+//! exact turns modulo one). Only a phase already reduced modulo one turn, or a complex sample, is narrowed to f32.
+//!
+//! *Reproducible.* Randomness takes a seed ([`random`]); results do not depend on the number of threads: work is
+//! parallel over what is written, never over a float sum.
+//!
+//! *Warnings* are returned as values; only the binary prints.
+//!
+//! # Rooms, from the ground up
+//!
+//! A module uses only modules that stand above it in this list; `tests/layering.rs` keeps it so.
+
+pub mod error;
+pub mod field;
+pub mod files;
+pub mod points;
+pub mod progress;
+pub mod random;
+pub mod scene;
+pub mod units;
+
+pub use error::{Error, Result};

@@ -1,0 +1,3 @@
+//! The binary `holodrive`.
+
+fn main() {}

@@ -1,0 +1,54 @@
+//! How long work tells that it moves on, and is told to stop.
+//!
+//! A step takes `&Progress`, calls [`Progress::start`] with its amount of work, [`Progress::advance`] as it goes and
+//! [`Progress::check`] at least every 50 ms; whoever started it watches the counters from another thread or sets
+//! [`Progress::stop`]. The library never prints.
+
+use crate::error::{Error, Result};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Counters of one running job, shared between the worker and its watcher.
+#[derive(Debug, Default)]
+pub struct Progress {
+    step: Mutex<String>,
+    done: AtomicU64,
+    total: AtomicU64,
+    stop: AtomicBool,
+}
+
+impl Progress {
+    /// A job that has not begun.
+    pub fn new() -> Self {
+        Self::default()
+    }
+    /// Names the step that begins and the amount of work in it (any unit; 0 when unknown).
+    pub fn start(&self, step: &str, total: u64) {
+        if let Ok(mut name) = self.step.lock() {
+            step.clone_into(&mut name);
+        }
+        self.done.store(0, Ordering::Relaxed);
+        self.total.store(total, Ordering::Relaxed);
+    }
+    /// Adds finished work.
+    pub fn advance(&self, work: u64) {
+        self.done.fetch_add(work, Ordering::Relaxed);
+    }
+    /// Asks the job to end at its next check.
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+    /// Whether the job was asked to end: for loops that cannot return an error.
+    pub fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+    /// Fails with [`Error::Interrupted`] once the job was asked to end.
+    pub fn check(&self) -> Result<()> {
+        if self.stopped() { Err(Error::Interrupted) } else { Ok(()) }
+    }
+    /// The step's name, work done and work in all.
+    pub fn snapshot(&self) -> (String, u64, u64) {
+        let step = self.step.lock().map(|name| name.clone()).unwrap_or_default();
+        (step, self.done.load(Ordering::Relaxed), self.total.load(Ordering::Relaxed))
+    }
+}

@@ -1,0 +1,128 @@
+//! Lengths and angles as people write them (`8um`, `632.8nm`, `0.25m`, `2deg`) to SI f64 and back.
+//!
+//! A bare number is refused: at the border every quantity says its unit.
+
+use crate::error::{Error, Result};
+
+/// Length units by their factor to metres. `µ` is accepted in both of its code points.
+const LENGTHS: [(&str, f64); 9] = [
+    ("pm", 1e-12),
+    ("nm", 1e-9),
+    ("um", 1e-6),
+    ("µm", 1e-6),
+    ("μm", 1e-6),
+    ("mm", 1e-3),
+    ("cm", 1e-2),
+    ("m", 1.0),
+    ("in", 0.0254),
+];
+
+/// Angle units by their factor to radians.
+const ANGLES: [(&str, f64); 4] =
+    [("deg", std::f64::consts::PI / 180.0), ("°", std::f64::consts::PI / 180.0), ("mrad", 1e-3), ("rad", 1.0)];
+
+fn parse(text: &str, units: &[(&str, f64)], kind: &'static str, example: &str) -> Result<f64> {
+    let text = text.trim();
+    let split = text
+        .char_indices()
+        .find(|&(at, c)| {
+            let exponent = (c == 'e' || c == 'E')
+                && text[at + 1..].starts_with(|d: char| d.is_ascii_digit() || d == '-' || d == '+');
+            !(c.is_ascii_digit() || matches!(c, '.' | '+' | '-') || exponent)
+        })
+        .map_or(text.len(), |(at, _)| at);
+    let (number, unit) = (text[..split].trim(), text[split..].trim());
+    let value: f64 = number
+        .parse()
+        .map_err(|_| Error::parameter(kind, format!("`{text}` is not a number with a unit, such as {example}")))?;
+    if unit.is_empty() {
+        return Err(Error::parameter(kind, format!("`{text}` has no unit; write it as {example}")));
+    }
+    let names = || units.iter().map(|u| u.0).filter(|u| u.is_ascii()).collect::<Vec<_>>().join(", ");
+    let factor = units
+        .iter()
+        .find(|(name, _)| *name == unit)
+        .ok_or_else(|| Error::parameter(kind, format!("`{text}`: unknown unit `{unit}`; use one of {}", names())))?
+        .1;
+    let value = value * factor;
+    if !value.is_finite() {
+        return Err(Error::parameter(kind, format!("`{text}` is not finite")));
+    }
+    Ok(value)
+}
+
+/// Reads a length with its unit: `8um` → 8e-6 [m]. Negative lengths are allowed; the caller knows its domain.
+pub fn length(text: &str) -> Result<f64> {
+    parse(text, &LENGTHS, "length", "8um, 632.8nm, 0.25m")
+}
+
+/// Reads a length that must be positive.
+pub fn positive_length(text: &str) -> Result<f64> {
+    let value = length(text)?;
+    if value > 0.0 { Ok(value) } else { Err(Error::parameter("length", format!("`{text}` must be greater than zero"))) }
+}
+
+/// Reads an angle with its unit: `2deg` → 0.0349 [rad].
+pub fn angle(text: &str) -> Result<f64> {
+    parse(text, &ANGLES, "angle", "2deg, 35mrad")
+}
+
+/// Prints a length [m] with the unit that keeps it between 1 and 1000, to at most six significant digits.
+pub fn show_length(metres: f64) -> String {
+    let magnitude = metres.abs();
+    let (unit, factor) = match magnitude {
+        0.0 => ("m", 1.0),
+        m if m < 1e-6 => ("nm", 1e-9),
+        m if m < 1e-3 => ("um", 1e-6),
+        m if m < 1.0 => ("mm", 1e-3),
+        _ => ("m", 1.0),
+    };
+    let digits = (5 - (magnitude / factor).max(1.0).log10().floor() as i32).clamp(0, 5) as usize;
+    let number = format!("{:.*}", digits, metres / factor);
+    let number = if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { &number };
+    format!("{number}{unit}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_and_angles_parse_to_si() {
+        for (text, metres) in [
+            ("8um", 8e-6),
+            ("632.8nm", 632.8e-9),
+            ("0.25 m", 0.25),
+            ("1e-3m", 1e-3),
+            ("-2.5cm", -0.025),
+            ("1in", 0.0254),
+            ("3.74µm", 3.74e-6),
+            ("2E2mm", 0.2),
+        ] {
+            let value = length(text).expect(text);
+            assert!((value - metres).abs() <= 1e-15 * metres.abs().max(1e-9), "{text}: {value} is not {metres}");
+        }
+        assert!((angle("180deg").expect("deg") - std::f64::consts::PI).abs() < 1e-15);
+        assert!((angle("5mrad").expect("mrad") - 0.005).abs() < 1e-18);
+    }
+
+    #[test]
+    fn bare_numbers_and_nonsense_are_refused() {
+        for text in ["8", "um", "", "8 parsec", "NaNm", "infm", "1e400m", "--3mm"] {
+            assert!(length(text).is_err(), "{text} was accepted");
+        }
+        assert!(length("8").unwrap_err().to_string().contains("no unit"));
+        assert!(positive_length("0m").is_err());
+        assert!(angle("2m").is_err());
+    }
+
+    #[test]
+    fn shown_lengths_read_back() {
+        for metres in [632.8e-9, 8e-6, 0.25, 1.0, 12.5, 0.000_999_9, 3.74e-6] {
+            let back = length(&show_length(metres)).expect("shown length");
+            assert!((back / metres - 1.0).abs() < 1e-5, "{metres} → {} → {back}", show_length(metres));
+        }
+        assert_eq!(show_length(8e-6), "8um");
+        assert_eq!(show_length(0.25), "250mm");
+    }
+}
