@@ -8,16 +8,21 @@
 //!
 //! What has been done stands in the frame's metadata ([`frame::Applied`]), so that nothing is done twice.
 
+pub mod drive;
 pub mod frame;
+mod frame_file;
 pub mod packing;
 pub mod profile;
 mod profile_file;
 pub mod response;
+pub mod wavefront;
 
+pub use drive::{Driven, Pattern, correct, drive};
 pub use frame::{Aperture, ApertureShape, Applied, EncodingRecord, Frame, FrameMetadata, Illumination, Origin};
 pub use packing::{Packing, SignalLayout, VideoFrame};
 pub use profile::{PanelKind, PanelProfile};
 pub use response::{Curve, DriveCurve, Modulation, PhaseSign, Response};
+pub use wavefront::Wavefront;
 
 use crate::error::{Error, Result};
 use crate::field::Grid;
