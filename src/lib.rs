@@ -42,6 +42,7 @@ pub mod field;
 pub mod files;
 pub mod points;
 pub mod progress;
+pub mod propagation;
 pub mod random;
 pub mod scene;
 pub mod units;
