@@ -44,6 +44,7 @@ pub mod points;
 pub mod progress;
 pub mod propagation;
 pub mod random;
+pub mod reconstruction;
 pub mod scene;
 pub mod units;
 

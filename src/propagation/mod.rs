@@ -42,6 +42,30 @@ impl Default for Settings {
     }
 }
 
+/// What a stop in the Fourier plane of a 4f relay lets through: a rectangle of spatial frequencies, less a disc.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aperture {
+    /// Middle of the rectangle, (f_x, f_y) [cycles/m].
+    pub center: [f64; 2],
+    /// Half width and half height of the rectangle [cycles/m].
+    pub half: [f64; 2],
+    /// Radius of the disc about zero frequency that is blocked [cycles/m]; 0 blocks nothing.
+    pub stop: f64,
+}
+
+impl Aperture {
+    /// A centred rectangle.
+    pub fn centered(half_x: f64, half_y: f64) -> Self {
+        Self { center: [0.0; 2], half: [half_x, half_y], stop: 0.0 }
+    }
+    /// Whether a plane wave passes.
+    pub fn passes(&self, fx: f64, fy: f64) -> bool {
+        (fx - self.center[0]).abs() <= self.half[0]
+            && (fy - self.center[1]).abs() <= self.half[1]
+            && (self.stop == 0.0 || fx.hypot(fy) >= self.stop)
+    }
+}
+
 /// A planned propagation between two grids of one pitch: reusable for any number of fields and distances.
 #[derive(Clone, Debug)]
 pub struct Propagator<T: FftNum> {
@@ -87,6 +111,17 @@ impl<T: FftNum> Propagator<T> {
 
     /// The field at `distance` d [m] in front of (d > 0, with the light) or behind (d < 0) the input plane.
     pub fn propagate(&self, field: &Field<T>, distance: f64, progress: &Progress) -> Result<Field<T>> {
+        self.propagate_through(field, distance, None, progress)
+    }
+
+    /// The same through a stop in the Fourier plane of a 1:1 relay before the distance.
+    pub fn propagate_through(
+        &self,
+        field: &Field<T>,
+        distance: f64,
+        aperture: Option<&Aperture>,
+        progress: &Progress,
+    ) -> Result<Field<T>> {
         assert_eq!(field.grid, self.input, "the field stands on the planned grid");
         if !distance.is_finite() {
             return Err(Error::parameter("distance", format!("{distance} m is not finite")));
@@ -111,7 +146,8 @@ impl<T: FftNum> Propagator<T> {
                 return;
             }
             for (u, &fy) in column.iter_mut().zip(&rows) {
-                if band_limit && !(y_band[0]..=y_band[1]).contains(&fy) {
+                let aliased = band_limit && !(y_band[0]..=y_band[1]).contains(&fy);
+                if aliased || aperture.is_some_and(|stop| !stop.passes(fx, fy)) {
                     *u = zero;
                     continue;
                 }
