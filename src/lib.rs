@@ -43,7 +43,9 @@ pub mod files;
 pub mod panel;
 pub mod points;
 pub mod progress;
+pub mod propagation;
 pub mod random;
+pub mod reconstruction;
 pub mod scene;
 pub mod units;
 

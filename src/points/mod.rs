@@ -1,5 +1,11 @@
 //! Point sources: what the scene's light becomes before it is a wave.
 
+pub mod images;
+pub mod placement;
+pub mod ply;
+
+pub use placement::{Placed, Placement, place};
+
 use glam::DVec3;
 
 /// One point of light in the hologram frame.
@@ -20,4 +26,59 @@ pub struct PointCloud {
     pub points: Vec<PointSource>,
     /// Amplitudes for red, green and blue (linear Rec.709 radiance under the root), one triple a point, if coloured.
     pub rgb: Option<Vec<[f32; 3]>>,
+}
+
+/// Which light of a coloured cloud makes a hologram of one wavelength.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Channel {
+    /// Rec.709 luminance: the whole scene in one colour.
+    #[default]
+    Luminance,
+    /// Linear red.
+    Red,
+    /// Linear green.
+    Green,
+    /// Linear blue.
+    Blue,
+}
+
+/// Rec.709 luminance of linear RGB.
+pub fn luminance(rgb: [f32; 3]) -> f32 {
+    0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+}
+
+impl Channel {
+    /// This channel of a linear RGB radiance.
+    pub fn of(self, rgb: [f32; 3]) -> f32 {
+        match self {
+            Self::Luminance => luminance(rgb),
+            Self::Red => rgb[0],
+            Self::Green => rgb[1],
+            Self::Blue => rgb[2],
+        }
+    }
+}
+
+impl PointCloud {
+    /// The points with the amplitudes of one channel; a colourless cloud has the same amplitude in each.
+    pub fn channel(&self, channel: Channel) -> Vec<PointSource> {
+        let of_rgb = |rgb: [f32; 3]| match channel {
+            Channel::Luminance => luminance(rgb.map(|a| a * a)).sqrt(),
+            other => other.of(rgb),
+        };
+        let mut points = self.points.clone();
+        if let Some(rgb) = &self.rgb {
+            for (point, rgb) in points.iter_mut().zip(rgb) {
+                point.amplitude = of_rgb(*rgb);
+            }
+        }
+        points
+    }
+    /// Lowest and highest z [m]; `None` for an empty cloud.
+    pub fn depth_range(&self) -> Option<(f64, f64)> {
+        self.points.iter().map(|p| p.position.z).fold(None, |range, z| match range {
+            None => Some((z, z)),
+            Some((low, high)) => Some((z.min(low), z.max(high))),
+        })
+    }
 }

@@ -1,0 +1,380 @@
+//! From the scene's metres to the panel's: the one place that scales a room to a hologram.
+//!
+//! *Window*: the camera's frustum is carried onto the pyramid from the viewer's eye through the panel, so that what the
+//! viewer sees is the camera's picture, with depth mapped into a chosen range. The map of depth, 1/(E − z) = α + β/w
+//! for camera depth w and eye distance E, is a homography: straight lines stay straight and planes stay planes.
+//!
+//! *Model*: a similarity transform; the scene is a miniature behind the panel, true for every view.
+
+use super::{Channel, PointCloud, PointSource};
+use crate::error::{Error, Result};
+use crate::field::Grid;
+use crate::random::Random;
+use crate::scene::{Camera, Projection, Scene};
+use glam::{DMat3, DMat4, DVec2, DVec3};
+
+/// Where the scene stands relative to the panel. Depths are z of the hologram frame [m]: negative behind the panel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Placement {
+    /// The camera's picture, seen through the panel as through a window.
+    Window {
+        /// Distance E of the viewer's eye in front of the panel [m].
+        eye: f64,
+        /// Where the nearest point stands, z [m].
+        near: f64,
+        /// Where the farthest point stands, z [m]; at most `near`.
+        far: f64,
+    },
+    /// The scene as a miniature.
+    Model {
+        /// Distance E of the viewer's eye in front of the panel [m].
+        eye: f64,
+        /// Where the middle of the scene's box stands, z [m].
+        z: f64,
+        /// Hologram metres for one scene metre; `None` fits the scene into the panel's view.
+        scale: Option<f64>,
+    },
+}
+
+impl Default for Placement {
+    /// A window seen from 0.6 m with the scene 100 to 150 mm behind an 8 µm panel: every point sends its whole
+    /// diffraction cone through the panel's middle, and the eye's accommodation (0.7 m) is comfortable.
+    fn default() -> Self {
+        Self::Window { eye: 0.6, near: -0.1, far: -0.15 }
+    }
+}
+
+/// Initial phase of the point sources.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// All points in step: smooth fields, strong forward light, lattice orders of regular points.
+    Zero,
+    /// Independent uniform phases: light goes into the whole cone, as from a matte surface; speckle.
+    Random {
+        /// Seed of the phases.
+        seed: u64,
+    },
+    /// −k × (distance from the eye): all waves reach the eye in step.
+    Path,
+}
+
+/// A placement made definite for one scene, camera and panel.
+#[derive(Clone, Debug)]
+pub struct Placing {
+    /// The camera whose rays make the points.
+    pub camera: Camera,
+    /// Width over height of the rays' picture.
+    pub aspect: f64,
+    /// The viewer's eye in the hologram frame [m].
+    pub eye: DVec3,
+    /// Half width and half height of the viewing window on the panel plane [m].
+    pub window: DVec2,
+    map: Map,
+}
+
+#[derive(Clone, Debug)]
+enum Map {
+    Window { near: f64, far: f64 },
+    Model { hologram_from_world: DMat4 },
+}
+
+/// A point in the world with the radiance that it sends to the eye.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorldPoint {
+    /// Where the camera's ray put it [m].
+    pub position: DVec3,
+    /// Linear RGB radiance.
+    pub radiance: [f32; 3],
+}
+
+/// Points in the hologram frame with what the panel can do with them.
+#[derive(Clone, Debug, Default)]
+pub struct Placed {
+    /// The points, coloured, in the order of the world points.
+    pub cloud: PointCloud,
+    /// Points whose light the panel cannot send to the eye: sin of the angle beyond λ/2p.
+    pub beyond_cone: usize,
+    /// Their part of the light (0 to 1).
+    pub beyond_cone_light: f64,
+}
+
+impl Placement {
+    /// Checks the placement and makes it definite for a scene seen by `camera` on a panel.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for an eye that is not in front of panel and points, or an inverted depth range.
+    pub fn prepare(&self, scene: &Scene, camera: &Camera, picture_aspect: f64, panel: &Grid) -> Result<Placing> {
+        let (width, height) = (panel.extent_x(), panel.extent_y());
+        let (eye, frontmost) = match *self {
+            Self::Window { eye, near, .. } => (eye, near),
+            Self::Model { eye, z, .. } => (eye, z),
+        };
+        if !(eye.is_finite() && eye > 0.0 && eye > frontmost) {
+            let what =
+                format!("the eye at {eye} m must stand in front of the panel and of the points at {frontmost} m");
+            return Err(Error::parameter("eye", what));
+        }
+        match *self {
+            Self::Window { eye, near, far } => {
+                if !(near.is_finite() && far.is_finite() && far <= near) {
+                    let what = format!("near {near} m and far {far} m (z): far must be at or behind near");
+                    return Err(Error::parameter("near/far", what));
+                }
+                let (half_width, half_height) = camera.half_size(picture_aspect);
+                let aspect = half_width / half_height;
+                let window_height = height.min(width / aspect);
+                let window = 0.5 * DVec2::new(window_height * aspect, window_height);
+                let map = Map::Window { near, far };
+                Ok(Placing { camera: camera.clone(), aspect, eye: DVec3::new(0.0, 0.0, eye), window, map })
+            }
+            Self::Model { eye, z, scale } => {
+                let window = 0.5 * DVec2::new(width, height);
+                let axes = DMat3::from_mat4(camera.world_from_camera);
+                let (center, half) = box_along(scene, axes)
+                    .ok_or_else(|| Error::parameter("placement", "the scene has no triangles to place"))?;
+                let scale = match scale {
+                    Some(scale) if scale.is_finite() && scale > 0.0 => scale,
+                    Some(scale) => return Err(Error::parameter("scale", format!("{scale} must be greater than zero"))),
+                    None => fitted_scale(window, half, eye, z)?,
+                };
+                // hologram = scale·axesᵀ·(world − center) + (0, 0, z)
+                let rotate = DMat4::from_mat3(axes.transpose() * scale);
+                let hologram_from_world =
+                    DMat4::from_translation(DVec3::new(0.0, 0.0, z)) * rotate * DMat4::from_translation(-center);
+                let world_from_hologram = hologram_from_world.inverse();
+                let eye = DVec3::new(0.0, 0.0, eye);
+                let camera = Camera {
+                    name: "eye".into(),
+                    world_from_camera: DMat4::from_mat3_translation(axes, world_from_hologram.transform_point3(eye)),
+                    projection: Projection::Perspective { yfov: 2.0 * (window.y / eye.z).atan(), aspect: None },
+                };
+                let aspect = window.x / window.y;
+                Ok(Placing { camera, aspect, eye, window, map: Map::Model { hologram_from_world } })
+            }
+        }
+    }
+}
+
+/// Middle (world) and half size (along `axes`) of the scene's box [m].
+fn box_along(scene: &Scene, axes: DMat3) -> Option<(DVec3, DVec3)> {
+    let inverse = axes.transpose();
+    let bounds = scene.triangles.iter().flat_map(|t| t.corners()).map(|p| inverse * p).fold(None, |b, p| match b {
+        None => Some((p, p)),
+        Some((low, high)) => Some((p.min(low), p.max(high))),
+    });
+    bounds.map(|(low, high): (DVec3, DVec3)| (axes * (0.5 * (low + high)), 0.5 * (high - low)))
+}
+
+/// The largest scale at which the box's near face still fits the view, s·h ≤ window·(E − z − s·h_z)/E for each axis,
+/// with a rim of 5 %.
+fn fitted_scale(window: DVec2, half: DVec3, eye: f64, z: f64) -> Result<f64> {
+    let fits = |window: f64, side: f64| window * (eye - z) / (eye * side + window * half.z);
+    let scale = 0.95 * fits(window.x, half.x).min(fits(window.y, half.y));
+    if scale.is_finite() && scale > 0.0 {
+        Ok(scale)
+    } else {
+        Err(Error::parameter("placement", "the scene has no extent, so it cannot be fitted; give --scale"))
+    }
+}
+
+/// Carries traced points into the hologram frame: position, amplitude √radiance × distance from the eye, phase.
+///
+/// The grid and wavelength say which directions the panel reaches; points beyond are kept and counted.
+pub fn place(points: &[WorldPoint], placing: &Placing, phase: Phase, panel: &Grid, wavelength: f64) -> Placed {
+    let positions = placing.positions(points);
+    let mut placed = Placed::default();
+    let (mut all_light, mut lost_light) = (0.0, 0.0);
+    let mut rgb = Vec::with_capacity(points.len());
+    let sine_limit = wavelength * DVec2::new(panel.limit_x(), panel.limit_y());
+    for (index, (point, position)) in points.iter().zip(positions).enumerate() {
+        let to_eye = placing.eye - position;
+        let distance = to_eye.length();
+        let light = f64::from(Channel::Luminance.of(point.radiance));
+        all_light += light;
+        if to_eye.x.abs() > sine_limit.x * distance || to_eye.y.abs() > sine_limit.y * distance {
+            placed.beyond_cone += 1;
+            lost_light += light;
+        }
+        let amplitude = |radiance: f32| (f64::from(radiance.max(0.0)).sqrt() * distance) as f32;
+        let phase = match phase {
+            Phase::Zero => 0.0,
+            Phase::Random { seed } => Random::new(seed, index as u64).phase(),
+            Phase::Path => {
+                let turns = -distance / wavelength;
+                std::f64::consts::TAU * (turns - turns.floor())
+            }
+        };
+        rgb.push(point.radiance.map(amplitude));
+        placed.cloud.points.push(PointSource {
+            position,
+            amplitude: amplitude(Channel::Luminance.of(point.radiance)),
+            phase,
+        });
+    }
+    placed.cloud.rgb = Some(rgb);
+    placed.beyond_cone_light = if all_light > 0.0 { lost_light / all_light } else { 0.0 };
+    placed
+}
+
+impl Placing {
+    fn positions(&self, points: &[WorldPoint]) -> Vec<DVec3> {
+        match &self.map {
+            Map::Model { hologram_from_world } => {
+                points.iter().map(|p| hologram_from_world.transform_point3(p.position)).collect()
+            }
+            Map::Window { near, far } => self.through_window(points, *near, *far),
+        }
+    }
+
+    fn through_window(&self, points: &[WorldPoint], near: f64, far: f64) -> Vec<DVec3> {
+        let camera_from_world = self.camera.world_from_camera.inverse();
+        let seen: Vec<DVec3> = points.iter().map(|p| camera_from_world.transform_point3(p.position)).collect();
+        let (half_width, half_height) = self.camera.half_size(self.aspect);
+        let depths = seen.iter().map(|p| -p.z);
+        let nearest = depths.clone().fold(f64::INFINITY, f64::min);
+        let farthest = depths.fold(f64::NEG_INFINITY, f64::max);
+        let perspective = matches!(self.camera.projection, Projection::Perspective { .. });
+        // 1/(E − z) = α + β·s with s = 1/w: exact at both ends of the depth range.
+        let s = |w: f64| if perspective { 1.0 / w } else { w };
+        let reach = |z: f64| if perspective { 1.0 / (self.eye.z - z) } else { z };
+        let (near_s, far_s) = (s(nearest), s(farthest));
+        let slope = if near_s == far_s { 0.0 } else { (reach(near) - reach(far)) / (near_s - far_s) };
+        seen.iter()
+            .map(|p| {
+                let w = -p.z;
+                let value = reach(near) + slope * (s(w) - near_s);
+                let z = if perspective { self.eye.z - 1.0 / value } else { value };
+                let (x, y) = if perspective { (p.x / w, p.y / w) } else { (p.x, p.y) };
+                let spread = (self.eye.z - z) / self.eye.z;
+                DVec3::new(x / half_width * self.window.x * spread, y / half_height * self.window.y * spread, z)
+            })
+            .collect()
+    }
+
+    /// The rectangle of the plane `z` that the eye sees through the window: half width and half height [m].
+    pub fn view_at(&self, z: f64) -> DVec2 {
+        self.window * ((self.eye.z - z) / self.eye.z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Triangle;
+    use glam::{Vec2, Vec3};
+
+    fn panel() -> Grid {
+        Grid::new(1920, 1080, 8e-6, 8e-6).expect("panel")
+    }
+
+    fn camera() -> Camera {
+        let mut camera = Camera::looking_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 2.0, -4.0), 0.7);
+        camera.projection = Projection::Perspective { yfov: 0.7, aspect: Some(1.0) };
+        camera
+    }
+
+    fn scene() -> Scene {
+        let triangle = |a: Vec3, b: Vec3, c: Vec3| Triangle {
+            positions: [a, b, c],
+            normals: [Vec3::Z; 3],
+            texcoords: [[Vec2::ZERO; 2]; 3],
+            colors: [Vec3::ONE; 3],
+            material: 0,
+            instance: 0,
+        };
+        let mut scene = Scene::default();
+        scene.triangles.push(triangle(Vec3::ZERO, Vec3::new(2.0, 4.0, -6.0), Vec3::new(0.0, 4.0, 0.0)));
+        scene
+    }
+
+    #[test]
+    fn window_keeps_the_picture_and_maps_depth_into_its_range() {
+        let placement = Placement::Window { eye: 0.6, near: -0.1, far: -0.15 };
+        let placing = placement.prepare(&scene(), &camera(), 1.0, &panel()).expect("placing");
+        assert!((placing.window.y - 0.5 * 1080.0 * 8e-6).abs() < 1e-12);
+        assert!((placing.window.x - placing.window.y).abs() < 1e-12);
+        let mut points = Vec::new();
+        for (u, v, w) in [(0.1, 0.2, 2.0), (0.9, 0.4, 5.0), (0.5, 0.5, 3.0), (0.3, 0.8, 4.0)] {
+            let ray = placing.camera.ray(u, v, 1.0);
+            let along = w / -placing.camera.world_from_camera.inverse().transform_vector3(ray.direction).z;
+            points.push(WorldPoint { position: ray.origin + along * ray.direction, radiance: [1.0; 3] });
+        }
+        let placed = place(&points, &placing, Phase::Zero, &panel(), 632.8e-9);
+        for (point, (u, v)) in placed.cloud.points.iter().zip([(0.1, 0.2), (0.9, 0.4), (0.5, 0.5), (0.3, 0.8)]) {
+            // Seen from the eye the point stands at the picture's (u, v): x to the right, v downwards.
+            let p = point.position;
+            let on_panel = DVec2::new(p.x, p.y) * 0.6 / (0.6 - p.z);
+            let expected = DVec2::new(2.0 * u - 1.0, 1.0 - 2.0 * v) * placing.window;
+            assert!((on_panel - expected).length() < 1e-12, "{on_panel} {expected}");
+            // Equal radiance is equal brightness: amplitude over distance is the same.
+            let distance = (placing.eye - p).length();
+            assert!((f64::from(point.amplitude) / distance - 1.0).abs() < 1e-6);
+        }
+        let z: Vec<f64> = placed.cloud.points.iter().map(|p| p.position.z).collect();
+        assert!((z[0] + 0.1).abs() < 1e-12 && (z[1] + 0.15).abs() < 1e-12);
+        assert!(z[0] > z[2] && z[2] > z[3] && z[3] > z[1]);
+        assert_eq!(placed.beyond_cone, 0);
+    }
+
+    #[test]
+    fn window_keeps_straight_lines_straight() {
+        let placing = Placement::default().prepare(&scene(), &camera(), 1.0, &panel()).expect("placing");
+        let (a, b) = (DVec3::new(0.2, 1.5, 1.0), DVec3::new(1.7, 2.6, -6.0));
+        let points: Vec<_> =
+            (0..=8).map(|i| WorldPoint { position: a.lerp(b, f64::from(i) / 8.0), radiance: [1.0; 3] }).collect();
+        let out = place(&points, &placing, Phase::Zero, &panel(), 632.8e-9).cloud.points;
+        let direction = (out[8].position - out[0].position).normalize();
+        for p in &out {
+            let off = (p.position - out[0].position).cross(direction).length();
+            assert!(off < 1e-15 + 1e-10 * out[0].position.length(), "{off}");
+        }
+    }
+
+    #[test]
+    fn model_is_a_similarity_that_fits_the_view() {
+        let placement = Placement::Model { eye: 0.5, z: -0.2, scale: None };
+        let placing = placement.prepare(&scene(), &camera(), 1.0, &panel()).expect("placing");
+        let corners: Vec<_> =
+            scene().triangles[0].corners().map(|position| WorldPoint { position, radiance: [0.5, 0.25, 0.0] }).to_vec();
+        let out = place(&corners, &placing, Phase::Random { seed: 1 }, &panel(), 632.8e-9).cloud.points;
+        let ratio = |i: usize, j: usize| {
+            (out[i].position - out[j].position).length() / (corners[i].position - corners[j].position).length()
+        };
+        assert!((ratio(0, 1) / ratio(1, 2) - 1.0).abs() < 1e-9 && (ratio(0, 1) / ratio(0, 2) - 1.0).abs() < 1e-9);
+        for p in &out {
+            let view = placing.view_at(p.position.z);
+            assert!(p.position.x.abs() <= view.x && p.position.y.abs() <= view.y, "{:?} outside {view}", p.position);
+        }
+        // The traced camera stands where the eye does: its ray to a corner passes through the same panel point.
+        let toward = (corners[1].position - placing.camera.eye()).normalize();
+        let local = placing.camera.world_from_camera.inverse().transform_vector3(toward);
+        let hologram = (out[1].position - placing.eye).normalize();
+        assert!((local - hologram).length() < 1e-12);
+    }
+
+    #[test]
+    fn light_beyond_the_cone_is_counted() {
+        // At 8 µm and 632.8 nm the panel bends light by 2.27°; an eye at 0.1 m sees the panel's edge at 4.4°.
+        let placement = Placement::Window { eye: 0.1, near: -0.1, far: -0.15 };
+        let placing = placement.prepare(&scene(), &camera(), 1.0, &panel()).expect("placing");
+        let at = |u, v| {
+            let ray = placing.camera.ray(u, v, 1.0);
+            WorldPoint { position: ray.origin + 3.0 * ray.direction, radiance: [1.0; 3] }
+        };
+        let placed = place(&[at(0.5, 0.5), at(0.99, 0.5), at(0.5, 0.01)], &placing, Phase::Path, &panel(), 632.8e-9);
+        assert_eq!(placed.beyond_cone, 2);
+        assert!((placed.beyond_cone_light - 2.0 / 3.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn impossible_placements_are_refused() {
+        for placement in [
+            Placement::Window { eye: -0.6, near: -0.1, far: -0.2 },
+            Placement::Window { eye: 0.6, near: -0.2, far: -0.1 },
+            Placement::Window { eye: 0.6, near: 0.7, far: -0.1 },
+            Placement::Model { eye: 0.6, z: -0.1, scale: Some(0.0) },
+        ] {
+            assert!(placement.prepare(&scene(), &camera(), 1.0, &panel()).is_err(), "{placement:?}");
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! Point clouds as PLY: ours, OpenHolo's and plain ones, ASCII and binary.
+//!
+//! Ours is `binary_little_endian`: `double x y z` [m, hologram frame], `float amplitude` (or `amplitude_r/g/b`),
+//! `double phase` [rad], and a comment `holodrive {…}` of JSON metadata. On reading, a missing amplitude is 1, a
+//! missing phase 0; `red green blue` (uchar, or float in 0–1) are amplitudes as OpenHolo means them.
+
+mod header;
+mod read;
+mod write;
+
+pub use read::{Read, read};
+pub use write::write;
+
+use serde::{Deserialize, Serialize};
+
+/// In which frame the positions of a file stand.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Frame {
+    /// Metres from the panel's middle: ready for a hologram.
+    #[default]
+    Hologram,
+    /// The scene's own metres, where the camera's rays put the points.
+    World,
+}
+
+/// What our own files say of themselves, in one comment line.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Metadata {
+    /// In which frame the positions stand.
+    pub frame: Frame,
+    /// The scene that the points were traced in.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub scene: String,
+    /// Eye position in the hologram frame [m], if the points were placed for one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub eye: Option<[f64; 3]>,
+    /// Half width and half height of the viewing window on the panel plane [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub window: Option<[f64; 2]>,
+    /// Columns and rows of rays.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rays: Option<[usize; 2]>,
+    /// Initial phase: zero, path, or random with its seed.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub phase: String,
+}
+
+#[cfg(test)]
+mod tests;

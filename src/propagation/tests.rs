@@ -1,0 +1,219 @@
+//! Trust, from the ground up: analytic fields → the term-by-term oracle → the fast path → single precision.
+
+use super::*;
+use crate::field::{Complex64, relative_error};
+use crate::random::Random;
+use std::f64::consts::TAU;
+
+fn noise(grid: Grid, wavelength: f64) -> Field<f64> {
+    let mut field = Field::<f64>::zeros(grid, wavelength);
+    let mut random = Random::new(11, 0);
+    for u in &mut field.samples {
+        *u = Complex64::from_polar(random.uniform(), random.phase());
+    }
+    field
+}
+
+/// Complex amplitude of a Gaussian beam with its waist `w0` at z = 0 (Siegman, *Lasers*, §16.3; exp(−iωt)).
+fn gaussian(grid: Grid, wavelength: f64, w0: f64, z: f64, center: [f64; 2]) -> Field<f64> {
+    let k = TAU / wavelength;
+    let rayleigh = 0.5 * k * w0 * w0;
+    let mut field = Field::<f64>::zeros(grid, wavelength);
+    for row in 0..grid.height {
+        for column in 0..grid.width {
+            let (x, y) = (grid.x(column) - center[0], grid.y(row) - center[1]);
+            // 1/(1 + iz/z_R)·exp(ikz − ρ²/(w0²(1 + iz/z_R))): the same as the usual w(z), R(z), Gouy form.
+            let q = Complex64::new(1.0, z / rayleigh);
+            let u = (Complex64::new(-(x * x + y * y) / (w0 * w0), 0.0) / q).exp() / q;
+            field.samples[row * grid.width + column] = u * Complex64::cis(k * z);
+        }
+    }
+    field
+}
+
+#[test]
+fn oracle_carries_a_gaussian_beam() {
+    let grid = Grid::new(60, 48, 10e-6, 12e-6).expect("grid");
+    let (wavelength, w0, z) = (633e-9, 80e-6, 0.02);
+    let start = gaussian(grid, wavelength, w0, 0.0, [40e-6, -30e-6]);
+    let out = oracle::propagate(&start, z, grid).expect("oracle");
+    let expected = gaussian(grid, wavelength, w0, z, [40e-6, -30e-6]);
+    // The beam's formula is paraxial: its phase errs by k·z·θ⁴/8 with θ = λ/(πw0) = 2.5e-3, which is 1e-6 rad;
+    // the window cuts the waist at 3.2 w0, where the amplitude is 3e-5.
+    let error = relative_error(&out.samples, &expected.samples);
+    assert!(error < 2e-4, "{error}");
+}
+
+#[test]
+fn fast_path_is_the_oracle_on_odd_and_non_square_windows() {
+    for (size, out_size, pitch, distance) in [
+        ((37, 20), (37, 20), (8e-6, 8e-6), 0.004),
+        ((24, 31), (40, 15), (3e-6, 4.5e-6), 0.0007),
+        ((30, 17), (21, 44), (8e-6, 6e-6), -0.003),
+        ((16, 16), (16, 16), (0.4e-6, 0.5e-6), 0.00001),
+    ] {
+        let grid = Grid::new(size.0, size.1, pitch.0, pitch.1).expect("grid").centered_at([1e-4, -2e-4]);
+        let output = Grid::new(out_size.0, out_size.1, pitch.0, pitch.1).expect("grid").centered_at([1e-4, -2e-4]);
+        let field = noise(grid, 532e-9);
+        let expected = oracle::propagate(&field, distance, output).expect("oracle");
+        let fast = propagate_to(&field, distance, output, &Progress::new()).expect("fast");
+        let error = relative_error(&fast.samples, &expected.samples);
+        assert!(error < 1e-10, "{size:?} → {out_size:?} over {distance} m: {error}");
+        let single = propagate_to(&field.to_f32(), distance, output, &Progress::new()).expect("single");
+        assert!(relative_error(&single.samples, &expected.samples) < 1e-6);
+    }
+}
+
+#[test]
+fn an_off_axis_window_sees_what_a_large_one_sees_there() {
+    let grid = Grid::new(64, 50, 8e-6, 8e-6).expect("grid");
+    let beam = gaussian(grid, 633e-9, 70e-6, 0.0, [20e-6, 30e-6]);
+    let large = Grid::new(401, 301, 8e-6, 8e-6).expect("grid");
+    let far = propagate_to(&beam, 0.02, large, &Progress::new()).expect("large");
+    // A window of whole pixels of the large one, off its middle: same positions, so the fields must be equal.
+    let (first_column, first_row) = (185, 125);
+    let window =
+        Grid::new(61, 43, 8e-6, 8e-6).expect("grid").centered_at([large.x(first_column + 30), large.y(first_row + 21)]);
+    let seen = propagate_to(&beam, 0.02, window, &Progress::new()).expect("window");
+    let expected: Vec<Complex64> =
+        (0..window.len()).map(|i| far.samples[(first_row + i / 61) * 401 + first_column + i % 61]).collect();
+    // Each band limit drops what misses its own window: here the wide-angle waves of the input's cut edge, where
+    // the beam's amplitude is still 3e-3.
+    let error = relative_error(&seen.samples, &expected);
+    assert!(error < 3e-4, "{error}");
+}
+
+#[test]
+fn there_and_back_gives_the_field_again_and_energy_is_kept() {
+    let grid = Grid::new(150, 90, 8e-6, 8e-6).expect("grid");
+    let beam = gaussian(grid, 633e-9, 100e-6, 0.0, [50e-6, 20e-6]);
+    let there = propagate(&beam, 0.02, &Progress::new()).expect("there");
+    let back = propagate(&there, -0.02, &Progress::new()).expect("back");
+    assert!(relative_error(&back.samples, &beam.samples) < 2e-3);
+    let energy = |f: &Field<f64>| f.samples.iter().map(|u| u.norm_sqr()).sum::<f64>();
+    assert!((energy(&there) / energy(&beam) - 1.0).abs() < 1e-4);
+    let nowhere = propagate(&beam, 0.0, &Progress::new()).expect("no distance");
+    assert!(relative_error(&nowhere.samples, &beam.samples) < 1e-12);
+}
+
+#[test]
+fn a_diverging_wave_stays_one_and_its_phase_grows_with_distance() {
+    // exp(+ikr)/r from a point 50 mm behind, carried 10 mm on, is exp(+ikr)/r of a point 60 mm behind. This pins
+    // the sign of the wave and of the transform in one comparison of complex fields.
+    let grid = Grid::new(300, 260, 8e-6, 8e-6).expect("grid");
+    let wavelength = 633e-9;
+    let spherical = |z: f64| {
+        let mut field = Field::<f64>::zeros(grid, wavelength);
+        for row in 0..grid.height {
+            for column in 0..grid.width {
+                let (x, y) = (grid.x(column) - 1e-4, grid.y(row) - 2e-4);
+                let r = (x * x + y * y + z * z).sqrt();
+                field.samples[row * grid.width + column] = Complex64::from_polar(1.0 / r, TAU / wavelength * r);
+            }
+        }
+        field
+    };
+    let carried = propagate(&spherical(0.050), 0.010, &Progress::new()).expect("carried");
+    let expected = spherical(0.060);
+    // The window cuts the wave, so edges ring; the inner half is compared. Ringing there is a few per cent; a wrong
+    // sign would be an error above 1.
+    let inner = |f: &Field<f64>| -> Vec<Complex64> {
+        (65..195).flat_map(|r| f.samples[r * 300 + 75..r * 300 + 225].to_vec()).collect()
+    };
+    let error = relative_error(&inner(&carried), &inner(&expected));
+    assert!(error < 0.06, "{error}");
+}
+
+#[test]
+fn talbot_images_of_a_grating() {
+    // A periodic amplitude repeats itself after z_T = 2·period²/λ (paraxial), and is shifted by half a period
+    // after half of that.
+    let (wavelength, pitch, period) = (633e-9, 8e-6, 16.0 * 8e-6);
+    let grid = Grid::new(2048, 1, pitch, pitch).expect("grid");
+    let mut field = Field::<f64>::zeros(grid, wavelength);
+    for column in 0..grid.width {
+        field.samples[column] = Complex64::new(1.0 + (TAU * grid.x(column) / period).cos(), 0.0);
+    }
+    let talbot = 2.0 * period * period / wavelength;
+    // One row stands for a field that is constant in y only if y does not spread: propagate a tall window's row.
+    let tall = Grid::new(2048, 9, pitch, 1.0).expect("grid");
+    let samples = (0..9).flat_map(|_| field.samples.clone()).collect();
+    let field = Field { grid: tall, wavelength, samples };
+    let out = propagate(&field, 0.5 * talbot, &Progress::new()).expect("half Talbot");
+    let middle = &out.samples[4 * 2048 + 900..4 * 2048 + 1148];
+    let expected: Vec<f64> = (900..1148).map(|c| (1.0 - (TAU * tall.x(c) / period).cos()).powi(2)).collect();
+    let scale: f64 = middle.iter().map(|u| u.norm_sqr()).sum::<f64>() / expected.iter().sum::<f64>();
+    for (u, e) in middle.iter().zip(&expected) {
+        // The grating ends at the window, which rings by about 1/√(2·Fresnel number of the half width) ≈ 0.05.
+        assert!((u.norm_sqr() / scale - e).abs() < 0.25, "{} {e}", u.norm_sqr() / scale);
+    }
+}
+
+#[test]
+fn a_slit_gives_fresnels_integrals() {
+    // Slit of half width a in front of a plane wave: u(x) = √(1/(i λ d))·∫exp(iπ(x−x')²/(λd))dx'·exp(ikd). The
+    // integral is done here by fine trapezoids, independent of any transform.
+    let (wavelength, pitch, distance) = (633e-9, 8e-6, 0.15);
+    let (width, half) = (1024usize, 60usize);
+    let grid = Grid::new(width, 3, pitch, 1.0).expect("grid");
+    let mut field = Field::<f64>::zeros(grid, wavelength);
+    for row in 0..3 {
+        for column in width / 2 - half..width / 2 + half {
+            field.samples[row * width + column] = Complex64::new(1.0, 0.0);
+        }
+    }
+    let out = propagate(&field, distance, &Progress::new()).expect("out");
+    let edge = half as f64 * pitch;
+    let steps = 40_000;
+    let (mut difference, mut norm) = (0.0, 0.0);
+    for column in (width / 2 - 120..width / 2 + 120).step_by(7) {
+        let x = grid.x(column);
+        let sum: Complex64 = (0..steps)
+            .map(|i| {
+                let at = -edge + (i as f64 + 0.5) * 2.0 * edge / steps as f64;
+                Complex64::cis(std::f64::consts::PI * (x - at).powi(2) / (wavelength * distance))
+            })
+            .sum::<Complex64>()
+            * (2.0 * edge / steps as f64);
+        let factor = (Complex64::new(0.0, -1.0) / (wavelength * distance)).sqrt();
+        let expected = factor * sum * Complex64::cis(TAU / wavelength * distance);
+        difference += (out.samples[width + column] - expected).norm_sqr();
+        norm += expected.norm_sqr();
+    }
+    // A sharp edge has frequencies beyond the pitch's limit; what they carry is ≈ pitch/edge of the energy.
+    let error = (difference / norm).sqrt();
+    assert!(error < 0.03, "{error}");
+}
+
+#[test]
+fn fresnel_and_exact_agree_where_fresnel_is_valid_and_nowhere_else() {
+    let grid = Grid::new(128, 100, 8e-6, 8e-6).expect("grid");
+    let beam = gaussian(grid, 633e-9, 60e-6, 0.0, [0.0, 0.0]);
+    let settings = Settings { kernel: Kernel::Fresnel, ..Settings::default() };
+    let run = |field: &Field<f64>, kernel, d| {
+        Propagator::new(field.grid, field.grid, Settings { kernel, ..settings })
+            .and_then(|p| p.propagate(field, d, &Progress::new()))
+            .expect("run")
+    };
+    let smooth =
+        relative_error(&run(&beam, Kernel::Fresnel, 0.02).samples, &run(&beam, Kernel::AngularSpectrum, 0.02).samples);
+    assert!(smooth < 1e-4, "{smooth}");
+    let fine = noise(Grid::new(128, 100, 1e-6, 1e-6).expect("grid"), 633e-9);
+    let rough =
+        relative_error(&run(&fine, Kernel::Fresnel, 3e-4).samples, &run(&fine, Kernel::AngularSpectrum, 3e-4).samples);
+    assert!(rough > 0.5, "{rough}");
+}
+
+#[test]
+fn impossible_requests_are_refused() {
+    let grid = Grid::new(8, 8, 8e-6, 8e-6).expect("grid");
+    let other = Grid::new(8, 8, 9e-6, 8e-6).expect("grid");
+    let field = Field::<f32>::zeros(grid, 5e-7);
+    assert!(propagate_to(&field, 0.1, other, &Progress::new()).is_err());
+    assert!(propagate(&field, f64::NAN, &Progress::new()).is_err());
+    let settings = Settings { memory: 1000, ..Settings::default() };
+    assert!(matches!(Propagator::<f32>::new(grid, grid, settings), Err(Error::Memory { .. })));
+    let stopped = Progress::new();
+    stopped.stop();
+    assert!(matches!(propagate(&field, 0.1, &stopped), Err(Error::Interrupted)));
+}

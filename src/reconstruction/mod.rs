@@ -1,0 +1,200 @@
+//! What an eye or a sensor sees of a field: numerically, and every figure of it is simulated.
+//!
+//! The field leaves the panel at z = 0. Its image at depth z is the field carried to that plane by the exact angular
+//! spectrum, forwards for z > 0, backwards for the virtual image behind the panel. An eye is a pupil: the field is
+//! carried to the pupil's plane, cut by it, and carried back to the plane that the eye focuses on, which is the image
+//! on the retina up to its scale, upright.
+
+pub mod metrics;
+mod picture;
+
+pub use picture::{Picture, Scale, write_rgb_png};
+
+use crate::error::{Error, Result};
+use crate::field::{Field, Grid};
+use crate::progress::Progress;
+use crate::propagation::{Aperture, Propagator, Settings};
+use glam::DVec2;
+
+/// From where and at what depth the field is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum View {
+    /// A sensor on the plane z [m] (or behind the panel the virtual image there), with the whole panel as aperture.
+    Plane {
+        /// Depth of the plane [m]; negative behind the panel.
+        z: f64,
+    },
+    /// An eye or camera.
+    Eye {
+        /// Middle of the pupil in the hologram frame [m]; z > 0.
+        position: [f64; 3],
+        /// Diameter of the pupil [m].
+        pupil: f64,
+        /// Depth that it focuses on, z [m].
+        focus: f64,
+    },
+}
+
+impl View {
+    /// Depth that is in focus, z [m].
+    pub fn focus(&self) -> f64 {
+        match *self {
+            Self::Plane { z } => z,
+            Self::Eye { focus, .. } => focus,
+        }
+    }
+}
+
+/// How a field is looked at, beside the view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViewSettings {
+    /// Stop in the Fourier plane of a relay after the panel: keeps the conjugate orders of an encoding out.
+    pub aperture: Option<Aperture>,
+    /// Propagation settings (memory budget).
+    pub propagation: Settings,
+}
+
+impl Default for ViewSettings {
+    fn default() -> Self {
+        Self { aperture: None, propagation: Settings::default() }
+    }
+}
+
+/// Intensity |u|² of the view on the rectangle of half size `half` [m] about the middle of its focal plane, on samples
+/// of the field's pitch.
+///
+/// # Errors
+/// [`Error::Parameter`] for an eye that is not in front of the panel, a pupil that is not positive, a window without
+/// extent; [`Error::Memory`] past the budget.
+pub fn intensity(
+    field: &Field,
+    view: &View,
+    half: DVec2,
+    settings: &ViewSettings,
+    progress: &Progress,
+) -> Result<(Grid, Vec<f32>)> {
+    let window = window(&field.grid, half)?;
+    let seen = match *view {
+        View::Plane { z } => Propagator::new(field.grid, window, settings.propagation)?.propagate_through(
+            field,
+            z,
+            settings.aperture.as_ref(),
+            progress,
+        )?,
+        View::Eye { position, pupil, focus } => {
+            let at_pupil = at_pupil(field, position, pupil, settings, progress)?;
+            Propagator::new(at_pupil.grid, window, settings.propagation)?.propagate(
+                &at_pupil,
+                focus - position[2],
+                progress,
+            )?
+        }
+    };
+    Ok((window, seen.intensity()))
+}
+
+/// The field on the pupil's plane, dark outside the pupil.
+fn at_pupil(
+    field: &Field,
+    position: [f64; 3],
+    pupil: f64,
+    settings: &ViewSettings,
+    progress: &Progress,
+) -> Result<Field> {
+    if !(position.iter().all(|c| c.is_finite()) && position[2] > 0.0) {
+        let what = format!("the eye at z = {} m must stand in front of the panel", position[2]);
+        return Err(Error::parameter("eye", what));
+    }
+    if !(pupil.is_finite() && pupil > 0.0) {
+        return Err(Error::parameter("pupil", format!("{pupil} m must be greater than zero")));
+    }
+    let grid = window(&field.grid, DVec2::splat(0.5 * pupil))?.centered_at([position[0], position[1]]);
+    let mut cut = Propagator::new(field.grid, grid, settings.propagation)?.propagate_through(
+        field,
+        position[2],
+        settings.aperture.as_ref(),
+        progress,
+    )?;
+    for (index, u) in cut.samples.iter_mut().enumerate() {
+        let (x, y) = (grid.x(index % grid.width) - position[0], grid.y(index / grid.width) - position[1]);
+        if x.hypot(y) > 0.5 * pupil {
+            *u = Default::default();
+        }
+    }
+    Ok(cut)
+}
+
+/// A centred grid of the field's pitch that covers ±half.
+fn window(field: &Grid, half: DVec2) -> Result<Grid> {
+    let side = |half: f64, pitch: f64| (2.0 * half / pitch).ceil();
+    let (width, height) = (side(half.x, field.pitch_x), side(half.y, field.pitch_y));
+    // 2²⁰ samples a side are metres of plane: a window beyond is a slip in a unit.
+    if !(width >= 1.0 && height >= 1.0 && width <= (1 << 20) as f64 && height <= (1 << 20) as f64) {
+        return Err(Error::parameter("window", format!("half size {} × {} m cannot be sampled", half.x, half.y)));
+    }
+    Grid::new(width as usize, height as usize, field.pitch_x, field.pitch_y)
+}
+
+/// The picture of one view: intensity summed over `width × height` equal cells of the rectangle ±`half` [m].
+pub fn picture(
+    field: &Field,
+    view: &View,
+    half: DVec2,
+    (width, height): (usize, usize),
+    settings: &ViewSettings,
+    progress: &Progress,
+) -> Result<Picture> {
+    let (grid, values) = intensity(field, view, half, settings, progress)?;
+    Ok(Picture::from_samples(&grid, &values, half, width, height))
+}
+
+/// A picture in which every pixel is in focus: each is taken from the reconstruction at its own depth.
+///
+/// `depths` holds z [m] for each pixel of a `width × height` picture seen through a window that spans `half_at(z)` at
+/// depth z; pixels without light have `None` and are taken from the farthest plane. The depths are sorted into planes
+/// no farther than `step` [m] apart. Returns the picture and the number of planes.
+pub fn all_in_focus(
+    field: &Field,
+    depths: &[Option<f64>],
+    (width, height): (usize, usize),
+    half_at: impl Fn(f64) -> DVec2,
+    step: f64,
+    settings: &ViewSettings,
+    progress: &Progress,
+) -> Result<(Picture, usize)> {
+    let known = depths.iter().flatten();
+    let near = known.clone().fold(f64::NEG_INFINITY, |a, &z| a.max(z));
+    let far = known.fold(f64::INFINITY, |a, &z| a.min(z));
+    if !(near.is_finite() && far.is_finite()) {
+        return Err(Error::parameter("depths", "no pixel has a depth"));
+    }
+    if !(step > 0.0) {
+        return Err(Error::parameter("step", format!("{step} m must be greater than zero")));
+    }
+    let planes = ((near - far) / step).ceil().max(1.0) as usize;
+    let thickness = (near - far) / planes as f64;
+    let plane_of = |depth: Option<f64>| {
+        let offset = (depth.unwrap_or(far) - far) / thickness.max(f64::MIN_POSITIVE);
+        (offset as usize).min(planes - 1)
+    };
+    let mut out = Picture { width, height, values: vec![0.0; width * height] };
+    progress.start("focus stack", planes as u64);
+    for plane in 0..planes {
+        if !depths.iter().any(|&d| plane_of(d) == plane) {
+            progress.advance(1);
+            continue;
+        }
+        let z = far + (plane as f64 + 0.5) * thickness;
+        let seen = picture(field, &View::Plane { z }, half_at(z), (width, height), settings, progress)?;
+        for ((value, &depth), seen) in out.values.iter_mut().zip(depths).zip(seen.values) {
+            if plane_of(depth) == plane {
+                *value = seen;
+            }
+        }
+        progress.advance(1);
+    }
+    Ok((out, planes))
+}
+
+#[cfg(test)]
+mod tests;
