@@ -4,6 +4,7 @@ use super::profile::PanelProfile;
 use super::response::Modulation;
 use crate::error::{Error, Result};
 use crate::field::npy::CONVENTION;
+use crate::propagation::Aperture;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -148,41 +149,4 @@ pub enum Illumination {
         /// The point (x, y, z) [m].
         position: [f64; 3],
     },
-}
-
-/// A window in the spectrum: what an aperture in the Fourier plane of a 4f system lets through.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Aperture {
-    /// Its outline.
-    pub shape: ApertureShape,
-    /// Its middle (f_x, f_y) [cycles/m].
-    pub center: [f64; 2],
-    /// Half of its extent along f_x and f_y [cycles/m].
-    pub half: [f64; 2],
-}
-
-/// Outlines of an [`Aperture`] with half extents a and b.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ApertureShape {
-    /// |f_x| ≤ a and |f_y| ≤ b.
-    Rectangle,
-    /// (f_x/a)² + (f_y/b)² ≤ 1.
-    Ellipse,
-    /// |f_x|/a + |f_y|/b ≤ 1.
-    Diamond,
-}
-
-impl Aperture {
-    /// Whether a spatial frequency [cycles/m] passes; the border does.
-    pub fn contains(&self, fx: f64, fy: f64) -> bool {
-        let (u, v) = ((fx - self.center[0]).abs() / self.half[0], (fy - self.center[1]).abs() / self.half[1]);
-        // Frequencies of a grid fall on the border up to rounding.
-        let one = 1.0 + 1e-9;
-        match self.shape {
-            ApertureShape::Rectangle => u <= one && v <= one,
-            ApertureShape::Ellipse => u * u + v * v <= one,
-            ApertureShape::Diamond => u + v <= one,
-        }
-    }
 }

@@ -15,13 +15,15 @@ pub mod packing;
 pub mod profile;
 mod profile_file;
 pub mod response;
+pub mod simulated;
 pub mod wavefront;
 
 pub use drive::{Driven, Pattern, correct, drive};
-pub use frame::{Aperture, ApertureShape, Applied, EncodingRecord, Frame, FrameMetadata, Illumination, Origin};
+pub use frame::{Applied, EncodingRecord, Frame, FrameMetadata, Illumination, Origin};
 pub use packing::{Packing, SignalLayout, VideoFrame};
 pub use profile::{PanelKind, PanelProfile};
 pub use response::{Curve, DriveCurve, Modulation, PhaseSign, Response};
+pub use simulated::{Faults, Simulation, simulate};
 pub use wavefront::Wavefront;
 
 use crate::error::{Error, Result};

@@ -306,3 +306,98 @@ fn response(at: &At<'_>, file: &ResponseFile, modulation: Modulation, levels: us
     };
     Ok(Response { wavelength, curve })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_embedded_profile_is_right_and_named_as_its_file() {
+        for (name, text) in EMBEDDED {
+            let profile = PanelProfile::parse(text, Path::new(name)).expect(name);
+            assert_eq!(profile.name, *name);
+            let (curve, _) = profile.drive_curve(profile.default_wavelength()).expect(name);
+            assert_eq!(curve.levels(), profile.levels());
+            assert_eq!(profile.warnings().is_empty(), profile.unverified.is_empty());
+            assert_eq!(PanelProfile::find(name).expect(name), profile);
+        }
+        let files = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/calib")).expect("calib").count();
+        assert_eq!(files, EMBEDDED.len(), "a file of calib/ is not embedded");
+        let generic = PanelProfile::generic().expect("generic");
+        assert_eq!((generic.width, generic.height, generic.bits), (1920, 1080, 8));
+        assert_eq!((generic.pitch_x, generic.pitch_y, generic.default_wavelength()), (8e-6, 8e-6, 632.8e-9));
+        assert_eq!(generic.drive_curve(450e-9).expect("curve").0.nearest(PI).0, 128);
+    }
+
+    #[test]
+    fn bad_profiles_are_refused_in_one_line_that_names_file_and_key() {
+        let good = EMBEDDED[0].1;
+        let dmd = EMBEDDED.iter().find(|(name, _)| *name == "ti-dlp4710").expect("dmd").1;
+        let cases = [
+            (good.replace("pitch = \"8um\"", ""), "pitch_x is missing"),
+            (good.replace("pitch =", "pich ="), "pich"),
+            (good.replace("\"8um\"", "\"0um\""), "greater than zero"),
+            (good.replace("\"8um\"", "\"-8um\""), "greater than zero"),
+            (good.replace("\"8um\"", "8e-6"), "with its unit"),
+            (good.replace("\"8um\"", "\"8\""), "no unit"),
+            (good.replace("\"8um\"", "\"8parsec\""), "unknown unit"),
+            (good.replace("\"8um\"", "\"8um\"\npitch_x = \"8um\""), "stands beside pitch"),
+            (good.replace("width = 1920", "width = 0"), "width"),
+            (good.replace("width = 1920", ""), "width"),
+            (good.replace("name = \"generic\"", ""), "name"),
+            (good.replace("bits = 8", "bits = 0"), "bits = 0"),
+            (good.replace("bits = 8", "bits = 12"), "carries 8 bits"),
+            (good.replace("0.93", "1.5"), "fill_factor"),
+            (good.replace("0.93", "0"), "fill_factor"),
+            (good.replace("0.93", "nan"), "fill_factor"),
+            (good.replace("[\"632.8nm\"]", "[]"), "wavelengths is empty"),
+            (good.replace("phase-lcos", "lcos"), "lcos"),
+            (good.replace("refresh = \"60Hz\"", "refresh = \"60\""), "no unit"),
+            (good.replace("refresh = \"60Hz\"", "unverified = [\"colour\"]"), "colour"),
+            (good.replace("levels_for_2pi = 256", ""), "levels_for_2pi is missing"),
+            (good.replace("levels_for_2pi = 256", "levels_for_2pi = 0"), "greater than 1"),
+            (good.replace("levels_for_2pi = 256", "levels_for_2pi = 256\nheights = []"), "does not belong"),
+            (good.replace("levels_for_2pi = 256", "levels_for_2pi = 256\ngamma = 2"), "gamma"),
+            (good.replace("kind = \"linear\"\nlevels_for_2pi = 256", "kind = \"amplitude\""), "modulates phase"),
+            (
+                good.replace("\"linear\"\nlevels_for_2pi = 256", "\"table\"\nunit = \"pi\"\nvalues = [0.0, 1.0]"),
+                "256 levels",
+            ),
+            (good.replace("\"linear\"\nlevels_for_2pi = 256", "\"table\"\nunit = \"grad\"\nvalues = [0.0]"), "grad"),
+            (
+                good.replace(
+                    "\"linear\"\nlevels_for_2pi = 256",
+                    "\"polynomial\"\nunit = \"rad\"\ncoefficients = [0.0, 1.0, -1.0]",
+                ),
+                "turns back",
+            ),
+            (good.replace("[[response]]", "[[answer]]"), "answer"),
+            (good.replace("[[response]]", "[signal]\npacking = \"santec\"\n[[response]]"), "santec"),
+            (good.replace("[[response]]", "[signal]\npacking = \"gray\"\nwidth = 1900\n[[response]]"), "too small"),
+            (dmd.replace("bits = 1", "bits = 8"), "two positions"),
+            ("]".to_owned(), "line 1"),
+            (String::new(), "name"),
+        ];
+        for (text, word) in cases {
+            let error = PanelProfile::parse(&text, Path::new("mine.toml")).expect_err(word);
+            let line = error.to_string();
+            assert!(matches!(error, Error::Calibration { .. }), "{line}");
+            assert!(line.starts_with("mine.toml: ") && line.contains(word) && !line.contains('\n'), "{word}: {line}");
+        }
+        assert!(PanelProfile::find("no-such-panel").expect_err("name").to_string().contains("generic"));
+        assert!(matches!(PanelProfile::find("missing.toml"), Err(Error::Io { .. })));
+    }
+
+    #[test]
+    fn curves_far_from_the_light_are_refused_and_near_ones_warned_of() {
+        let text = EMBEDDED[0].1.replace("levels_for_2pi = 256", "wavelength = \"632.8nm\"\nlevels_for_2pi = 200");
+        let profile = PanelProfile::parse(&text, Path::new("mine.toml")).expect("profile");
+        assert!(profile.drive_curve(633e-9).expect("same").1.is_empty());
+        let (curve, warnings) = profile.drive_curve(532e-9).expect("near");
+        assert_eq!(warnings.len(), 1);
+        // The path is kept: fewer levels make a turn of a shorter wave.
+        let levels = curve.levels_for_2pi().expect("phase");
+        assert!((levels / (200.0 * 532.0 / 632.8) - 1.0).abs() < 1e-9, "{levels}");
+        assert!(profile.drive_curve(405e-9).expect_err("far").to_string().contains("405nm"));
+    }
+}

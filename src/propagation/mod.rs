@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::field::{Complex, Fft2, Field, Grid};
 use crate::progress::Progress;
 use rustfft::FftNum;
+use serde::{Deserialize, Serialize};
 
 /// Which wave equation carries the field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,7 +44,7 @@ impl Default for Settings {
 }
 
 /// What a stop in the Fourier plane of a 4f relay lets through: a rectangle of spatial frequencies, less a disc.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Aperture {
     /// Middle of the rectangle, (f_x, f_y) [cycles/m].
     pub center: [f64; 2],
