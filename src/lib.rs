@@ -37,6 +37,7 @@
 //!
 //! A module uses only modules that stand above it in this list; `tests/layering.rs` keeps it so.
 
+pub mod encode;
 pub mod error;
 pub mod field;
 pub mod files;

@@ -1,0 +1,30 @@
+//! Limiting a field to a window of spatial frequencies.
+
+use crate::field::{Complex32, Fft2, Field};
+use crate::propagation::Aperture;
+
+/// The field's part within the window, and the share of its energy that lay outside.
+///
+/// The transform is periodic over the grid: what leaves at one border of a sharp window rings in at the other.
+pub fn limit(field: &Field, aperture: &Aperture) -> (Field, f64) {
+    let grid = field.grid;
+    let mut samples = field.samples.clone();
+    let before = field.energy();
+    Fft2::new(grid.width, grid.height).filter(&mut samples, grid.height, grid.height, |kx, column| {
+        let fx = grid.frequency_x(kx);
+        for (ky, u) in column.iter_mut().enumerate() {
+            if !aperture.passes(fx, grid.frequency_y(ky)) {
+                *u = Complex32::new(0.0, 0.0);
+            }
+        }
+    });
+    let limited = Field { grid, wavelength: field.wavelength, samples };
+    let dropped = if before > 0.0 { (1.0 - limited.energy() / before).max(0.0) } else { 0.0 };
+    (limited, dropped)
+}
+
+/// A centred window of `share` (0 … 1) of the grid's limits, with room for the rounding of frequencies on its border.
+pub(super) fn centered(field: &Field, share: [f64; 2]) -> Aperture {
+    let slack = 1.0 + 1e-9;
+    Aperture::centered(field.grid.limit_x() * share[0] * slack, field.grid.limit_y() * share[1] * slack)
+}

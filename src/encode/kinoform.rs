@@ -1,0 +1,26 @@
+//! Phase alone: the field's amplitude on the panel is dropped (Lesem, Hirsch & Jordan, *IBM J. Res. Dev.* 13 (1969)).
+//!
+//! Good for objects of random phase, whose light is spread evenly over the panel; an object of smooth phase gathers its
+//! light in places, and loses its picture with its amplitude.
+
+use super::EncodedPattern;
+use crate::error::Result;
+use crate::field::Field;
+use crate::panel::{EncodingRecord, Illumination, Modulation, Pattern, PhasePattern};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// arg u at each pixel.
+pub(super) fn pattern(field: &Field) -> Result<EncodedPattern> {
+    let phase = field.samples.par_iter().map(|u| u.im.atan2(u.re)).collect();
+    let pattern = Pattern::Phase(PhasePattern::new(field.grid, field.wavelength, phase)?);
+    let record = EncodingRecord {
+        method: "kinoform".into(),
+        modulation: Modulation::Phase,
+        parameters: BTreeMap::new(),
+        illumination: Illumination::Normal,
+        aperture: None,
+        scale: 1.0,
+    };
+    Ok(EncodedPattern { pattern, record, target: field.clone(), clipped: 0.0, dropped: 0.0, warnings: Vec::new() })
+}

@@ -1,0 +1,289 @@
+//! Field → pattern for a panel: phase only or amplitude fringes, in the panel's own levels and range.
+//!
+//! Every encoding makes a [`Pattern`], and an [`EncodingRecord`] that says how a reconstruction gets the field back: the
+//! wave that lights the panel, and the window of spatial frequencies to keep. [`encode`] puts the pattern through the
+//! panel's fixed order ([`crate::panel::drive`]) and measures what came of it on the panel's own levels.
+//!
+//! | encoding | modulates | band of the object | largest efficiency |
+//! |---|---|---|---|
+//! | [`Encoding::DoublePhase`] | phase | half the panel's by default | mean of \|u\|² over its greatest value |
+//! | [`Encoding::Kinoform`] | phase | all | mean of \|u\| squared over mean of \|u\|² |
+//! | [`Encoding::OffAxisBipolar`] | amplitude | half the panel's along the carrier | 1/16 |
+//! | [`Encoding::OffAxisIntensity`] | amplitude | a quarter of the panel's along the carrier | 1/16 |
+
+pub mod band;
+pub mod double_phase;
+pub mod kinoform;
+pub mod off_axis;
+
+pub use double_phase::{DoublePhase, Interlace};
+pub use off_axis::{OffAxis, Reference};
+
+use crate::error::{Error, Result};
+use crate::field::{Complex64, Field};
+use crate::panel::simulated::illuminate;
+use crate::panel::{EncodingRecord, Frame, Modulation, PanelProfile, Pattern, Wavefront, drive};
+use crate::progress::Progress;
+use rayon::prelude::*;
+
+/// The ways from a complex field to what a panel can show.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Encoding {
+    /// Two phases for one complex value, interlaced: Hsueh & Sawchuk 1978.
+    DoublePhase(DoublePhase),
+    /// The field's phase alone, its amplitude dropped: Lesem, Hirsch & Jordan 1969.
+    Kinoform,
+    /// Interference term of object and oblique reference, Re(u·r*), raised to be positive.
+    OffAxisBipolar(OffAxis),
+    /// Interference of object and oblique reference as a plate records it, |u + r|².
+    OffAxisIntensity(OffAxis),
+}
+
+impl Encoding {
+    /// Names as the command line and metadata write them.
+    pub const NAMES: [&'static str; 4] = ["double-phase", "kinoform", "off-axis-bipolar", "off-axis-intensity"];
+
+    /// The encoding of that name with its default settings.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] that lists the names.
+    pub fn named(name: &str) -> Result<Self> {
+        match name {
+            "double-phase" => Ok(Self::DoublePhase(DoublePhase::default())),
+            "kinoform" => Ok(Self::Kinoform),
+            "off-axis-bipolar" => Ok(Self::OffAxisBipolar(OffAxis::default())),
+            "off-axis-intensity" => Ok(Self::OffAxisIntensity(OffAxis::default())),
+            _ => {
+                let what = format!("`{name}` is no encoding; use one of {}", Self::NAMES.join(", "));
+                Err(Error::parameter("method", what))
+            }
+        }
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::DoublePhase(_) => Self::NAMES[0],
+            Self::Kinoform => Self::NAMES[1],
+            Self::OffAxisBipolar(_) => Self::NAMES[2],
+            Self::OffAxisIntensity(_) => Self::NAMES[3],
+        }
+    }
+
+    /// What its pattern modulates.
+    pub fn modulation(&self) -> Modulation {
+        match self {
+            Self::DoublePhase(_) | Self::Kinoform => Modulation::Phase,
+            Self::OffAxisBipolar(_) | Self::OffAxisIntensity(_) => Modulation::Amplitude,
+        }
+    }
+}
+
+/// What [`encode`] does beside the encoding.
+#[derive(Clone, Debug)]
+pub struct EncodeSettings {
+    /// The encoding and its own settings.
+    pub encoding: Encoding,
+    /// The panel's wavefront correction.
+    pub correction: Option<Wavefront>,
+}
+
+impl EncodeSettings {
+    /// An encoding without correction.
+    pub fn new(encoding: Encoding) -> Self {
+        Self { encoding, correction: None }
+    }
+}
+
+/// A pattern before it meets a panel, with the field that it stands for.
+#[derive(Clone, Debug)]
+pub struct EncodedPattern {
+    /// What a panel should show.
+    pub pattern: Pattern,
+    /// How to get the field back.
+    pub record: EncodingRecord,
+    /// The field that the pattern stands for: the given one, limited to the encoding's band.
+    pub target: Field,
+    /// Share of samples whose amplitude was clipped.
+    pub clipped: f64,
+    /// Share of the field's energy outside the encoding's band, dropped.
+    pub dropped: f64,
+    /// What a user should know.
+    pub warnings: Vec<String>,
+}
+
+/// What came of an encoding, measured on the panel's own levels (ideal otherwise: full fill factor, no bend).
+#[derive(Clone, Debug, PartialEq)]
+pub struct EncodeReport {
+    /// The encoding's name.
+    pub method: &'static str,
+    /// Share of the light on the panel that goes into the wanted field: |⟨u, g⟩|² / (⟨u, u⟩·N) for the field g behind
+    /// N pixels and the wanted field u.
+    pub efficiency: f64,
+    /// Relative error of the field within the encoding's band after the best complex factor: √(1 − |⟨u, g⟩|²/(⟨u, u⟩
+    /// ⟨g, g⟩)). It covers the border too, where the sharp band rings.
+    pub field_error: f64,
+    /// Share of samples whose amplitude passed the normalisation and was clipped.
+    pub clipped: f64,
+    /// Share of the given field's energy outside the encoding's band, which was dropped.
+    pub dropped: f64,
+    /// Root mean square of shown − wished phase [rad] (amplitude on an amplitude panel): quantisation and range.
+    pub quantisation_error: f64,
+    /// Share of pixels whose wish lies outside the panel's range.
+    pub unreachable: f64,
+    /// What a user should know.
+    pub warnings: Vec<String>,
+}
+
+/// A frame with its metadata complete (its origin aside, which the caller knows), and the report.
+#[derive(Clone, Debug)]
+pub struct Encoded {
+    /// Levels for the panel.
+    pub frame: Frame,
+    /// How good they are.
+    pub report: EncodeReport,
+}
+
+/// Encodes a field on the panel's pixels for that panel.
+///
+/// An amplitude encoding for a panel that modulates phase is made for the same panel as an amplitude modulator
+/// ([`PanelProfile::as_amplitude`]), with a warning: a liquid crystal between polarisers.
+///
+/// # Errors
+/// [`Error::Parameter`] when the field is not on the panel's grid, is dark or not finite, when a setting is out of its
+/// domain or the encoding needs phase and the panel has none; [`Error::Undersampled`] when reference wave and object
+/// pass the grid's limit; [`Error::Calibration`] when curve or correction do not fit.
+pub fn encode(
+    field: &Field,
+    profile: &PanelProfile,
+    settings: &EncodeSettings,
+    progress: &Progress,
+) -> Result<Encoded> {
+    let mut warnings = Vec::new();
+    let encoding = &settings.encoding;
+    let amplitude = match (encoding.modulation(), profile.modulation()) {
+        (Modulation::Phase, Modulation::Amplitude) => {
+            let what = format!(
+                "{} needs a panel that modulates phase; {} modulates amplitude: take off-axis-bipolar",
+                encoding.name(),
+                profile.name
+            );
+            return Err(Error::parameter("method", what));
+        }
+        (Modulation::Amplitude, Modulation::Phase) => profile.as_amplitude(),
+        _ => None,
+    };
+    if amplitude.is_some() {
+        warnings.push(format!(
+            "panel {} modulates phase: the fringes are for its pixels as amplitude modulator, between polarisers",
+            profile.name
+        ));
+    }
+    let profile = amplitude.as_ref().unwrap_or(profile);
+    let grid = profile.grid()?;
+    crate::panel::drive::fit(field.grid, profile)?;
+    let made = pattern(field, encoding, progress)?;
+    progress.start("drive levels", grid.height as u64);
+    let mut driven = drive(&made.pattern, settings.correction.as_ref(), profile)?;
+    warnings.extend(made.warnings);
+    warnings.append(&mut driven.warnings);
+    progress.check()?;
+    let mut frame = driven.frame;
+    let mut record = made.record;
+    let seen = shown(&frame, settings.correction.as_ref(), &record)?;
+    let (efficiency, field_error, scale) = compare(&made.target, seen, &record);
+    record.scale = scale;
+    frame.metadata.encoding = Some(record);
+    let report = EncodeReport {
+        method: encoding.name(),
+        efficiency,
+        field_error,
+        clipped: made.clipped,
+        dropped: made.dropped,
+        quantisation_error: driven.rms_error,
+        unreachable: driven.unreachable,
+        warnings,
+    };
+    Ok(Encoded { frame, report })
+}
+
+/// Encodes a field without a panel: the pattern as real numbers, for prints and for whoever drives a panel otherwise.
+///
+/// # Errors
+/// As [`encode`], without those about the panel.
+pub fn pattern(field: &Field, encoding: &Encoding, progress: &Progress) -> Result<EncodedPattern> {
+    if let Some(i) = field.samples.iter().position(|u| !u.is_finite()) {
+        let (column, row) = (i % field.grid.width, i / field.grid.width);
+        return Err(Error::parameter("field", format!("the sample at column {column}, row {row} is not finite")));
+    }
+    if field.samples.iter().all(|u| u.norm_sqr() == 0.0) {
+        return Err(Error::parameter("field", "it is dark everywhere; there is nothing to encode"));
+    }
+    progress.start(encoding.name(), 2);
+    match encoding {
+        Encoding::DoublePhase(settings) => double_phase::pattern(field, settings, progress),
+        Encoding::Kinoform => kinoform::pattern(field),
+        Encoding::OffAxisBipolar(settings) => off_axis::pattern(field, settings, off_axis::Fringe::Bipolar, progress),
+        Encoding::OffAxisIntensity(settings) => {
+            off_axis::pattern(field, settings, off_axis::Fringe::Intensity, progress)
+        }
+    }
+}
+
+/// The field behind the panel as the record has it lit, the correction taken for the bend that it undoes.
+fn shown(frame: &Frame, correction: Option<&Wavefront>, record: &EncodingRecord) -> Result<Field> {
+    let profile = &frame.metadata.panel;
+    let wavelength = frame.metadata.wavelength;
+    let (curve, _) = profile.drive_curve(wavelength)?;
+    let table: Vec<Complex64> = (0..curve.levels()).map(|l| curve.phasor(l as u16)).collect();
+    let mut samples: Vec<_> = frame
+        .levels
+        .par_iter()
+        .enumerate()
+        .map(|(i, &level)| {
+            let u = table[usize::from(level)];
+            let u = correction.map_or(u, |c| u * Complex64::cis(-f64::from(c.phase[i])));
+            num_complex::Complex32::new(u.re as f32, u.im as f32)
+        })
+        .collect();
+    let grid = profile.grid()?;
+    illuminate(&mut samples, grid, wavelength, record.illumination)?;
+    Field::new(grid, wavelength, samples)
+}
+
+/// Efficiency, error within the band, and the modulus of ⟨u, g⟩/⟨u, u⟩ for the wanted u and the field g.
+fn compare(wanted: &Field, seen: Field, record: &EncodingRecord) -> (f64, f64, f64) {
+    let seen = match &record.aperture {
+        Some(aperture) => band::limit(&seen, aperture).0,
+        None => seen,
+    };
+    let product: Complex64 = wanted
+        .samples
+        .iter()
+        .zip(&seen.samples)
+        .map(|(u, g)| Complex64::new(u.re.into(), -f64::from(u.im)) * Complex64::new(g.re.into(), g.im.into()))
+        .sum();
+    let (uu, gg, count) = (wanted.energy(), seen.energy(), seen.samples.len() as f64);
+    let efficiency = product.norm_sqr() / (uu * count);
+    let error = (1.0 - product.norm_sqr() / (uu * gg)).max(0.0).sqrt();
+    (efficiency, error, product.norm() / uu)
+}
+
+/// The amplitude below which a share `percentile` of the samples lies (1: the greatest).
+///
+/// # Errors
+/// [`Error::Parameter`] outside (0, 1].
+fn amplitude_at(field: &Field, percentile: f64) -> Result<f32> {
+    if !(percentile > 0.0 && percentile <= 1.0) {
+        return Err(Error::parameter("percentile", format!("{percentile} must be above 0 and at most 1")));
+    }
+    let mut intensity = field.intensity();
+    let rank = ((intensity.len() as f64 * percentile).ceil() as usize).clamp(1, intensity.len()) - 1;
+    let (_, value, _) = intensity.select_nth_unstable_by(rank, f32::total_cmp);
+    let value = value.sqrt();
+    // More than the given share may be dark: then the greatest amplitude is the only scale there is.
+    if value > 0.0 { Ok(value) } else { Ok(intensity.iter().fold(0.0, |a: f32, &b| a.max(b)).sqrt()) }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,219 @@
+//! Amplitude fringes of the object u with an oblique plane reference r = exp(i2πf_r·x).
+//!
+//! *Bipolar*: t = ½(1 + Re(u·r*)/A), after Lucente: the interference term alone. *Intensity*: t = |u + ρ·r|²/I, as a
+//! plate would record it, with the object's own |u|². Lit with r the panel gives back the object where it was,
+//!
+//! ```text
+//! bipolar:    t·r = r/2 + u/(4A) + u*·r²/(4A)
+//! intensity:  t·r = (ρ² + |u|²)·r/I + u·ρ/I + u*·ρ·r²/I      (|r| = 1)
+//! ```
+//!
+//! with the zero order along the reference and the conjugate at twice its angle. The three lie apart when the object's
+//! half width b, the carrier f_r and the panel's limit 1/(2·pitch) satisfy b < f_r (bipolar) or b < f_r/3 (intensity,
+//! whose |u|² is 2b wide), and f_r + b < the limit (or the conjugate's replica reaches the object). One axis decides:
+//! the one with the larger share of the limit as carrier. Along the other the object keeps the panel's whole band.
+
+use super::{EncodedPattern, amplitude_at, band};
+use crate::error::{Error, Result};
+use crate::field::{Complex32, Field};
+use crate::panel::simulated::illuminate;
+use crate::panel::{EncodingRecord, FringePattern, Illumination, Modulation, Pattern};
+use crate::progress::Progress;
+use crate::propagation::Aperture;
+use rayon::prelude::*;
+use serde_json::json;
+use std::collections::BTreeMap;
+
+/// Direction of the reference wave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reference {
+    /// Angles θ_x and θ_y to the panel's normal [rad]; positive: the light runs towards +x and +y. f = sin θ/λ.
+    Angle([f64; 2]),
+    /// Spatial frequency (f_x, f_y) on the panel [cycles/m].
+    Carrier([f64; 2]),
+}
+
+impl Reference {
+    /// Its spatial frequency on the panel [cycles/m].
+    pub fn frequency(self, wavelength: f64) -> [f64; 2] {
+        match self {
+            Self::Angle(angles) => angles.map(|angle| angle.sin() / wavelength),
+            Self::Carrier(frequency) => frequency,
+        }
+    }
+}
+
+/// Settings of the off-axis fringes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OffAxis {
+    /// The reference wave; absent: along +x, at half (bipolar) or three quarters (intensity) of the panel's limit.
+    pub reference: Option<Reference>,
+    /// Half width of the object's band along the carrier [cycles/m]; absent: the widest that keeps the orders apart.
+    pub bandwidth: Option<f64>,
+    /// The amplitude that uses the full contrast is the one below which this share of the samples lies.
+    pub percentile: f64,
+    /// Amplitude of the reference over that of the object, ρ/A (intensity only).
+    pub reference_ratio: f64,
+}
+
+impl Default for OffAxis {
+    fn default() -> Self {
+        Self { reference: None, bandwidth: None, percentile: 0.999, reference_ratio: 1.0 }
+    }
+}
+
+/// The two kinds of fringe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fringe {
+    Bipolar,
+    Intensity,
+}
+
+/// Carrier and band that keep the orders apart on a grid.
+struct Layout {
+    carrier: [f64; 2],
+    band: Aperture,
+    warnings: Vec<String>,
+}
+
+/// A narrower band than this share of the limit holds no picture: the carrier leaves no room.
+const LEAST_BAND: f64 = 0.125;
+
+/// Share of the room between the orders that the object gets: a finite panel's zero order is a little wide itself.
+const GUARD: f64 = 0.95;
+
+fn layout(field: &Field, settings: &OffAxis, fringe: Fringe) -> Result<Layout> {
+    let grid = field.grid;
+    let limits = [grid.limit_x(), grid.limit_y()];
+    let pitches = [grid.pitch_x, grid.pitch_y];
+    // Half widths of the object that fit between carrier and zero order.
+    let separation = if fringe == Fringe::Bipolar { 1.0 } else { 3.0 };
+    let carrier = match settings.reference {
+        Some(reference) => reference.frequency(field.wavelength),
+        None => [limits[0] * separation / (1.0 + separation), 0.0],
+    };
+    if !carrier.iter().all(|f| f.is_finite()) || carrier[0].hypot(carrier[1]) * field.wavelength >= 1.0 {
+        let what = format!("{carrier:?} cycles/m is no propagating wave at {} m", field.wavelength);
+        return Err(Error::parameter("reference", what));
+    }
+    let too_steep = |axis: usize, frequency: f64, hint: String| Error::Undersampled {
+        what: "reference wave and object",
+        frequency,
+        limit: limits[axis],
+        pitch: pitches[axis],
+        hint,
+    };
+    let steepest = |axis: usize| {
+        let angle = ((1.0 - LEAST_BAND) * limits[axis] * field.wavelength).min(1.0).asin().to_degrees();
+        format!("take a reference angle below {angle:.3} deg")
+    };
+    for axis in 0..2 {
+        if carrier[axis].abs() > limits[axis] {
+            return Err(too_steep(axis, carrier[axis].abs(), steepest(axis)));
+        }
+    }
+    let share = [carrier[0].abs() / limits[0], carrier[1].abs() / limits[1]];
+    let axis = usize::from(share[1] > share[0]);
+    let (along, limit) = (carrier[axis].abs(), limits[axis]);
+    let mut warnings = Vec::new();
+    let half = match settings.bandwidth {
+        Some(bandwidth) => {
+            if !(bandwidth > 0.0 && bandwidth.is_finite()) {
+                return Err(Error::parameter("bandwidth", format!("{bandwidth} cycles/m must be greater than zero")));
+            }
+            if along + bandwidth > limit * (1.0 + 1e-9) {
+                let most = limit - along;
+                let hint = format!("lower the carrier, or limit the object to {most:.4e} cycles/m");
+                return Err(too_steep(axis, along + bandwidth, hint));
+            }
+            if bandwidth * separation > along * (1.0 + 1e-9) {
+                warnings.push(format!(
+                    "carrier {along:.4e} cycles/m below {separation} × bandwidth {bandwidth:.4e}: the zero order overlaps the object"
+                ));
+            }
+            bandwidth
+        }
+        None => {
+            let least = LEAST_BAND * limit;
+            if limit - along < least {
+                return Err(too_steep(axis, along + least, steepest(axis)));
+            }
+            if along < separation * least {
+                let what = format!(
+                    "carrier {along:.4e} cycles/m leaves the object in the zero order; take at least {:.4e}",
+                    separation * least
+                );
+                return Err(Error::parameter("reference", what));
+            }
+            GUARD * (limit - along).min(along / separation)
+        }
+    };
+    let mut share = [1.0; 2];
+    share[axis] = half / limit;
+    Ok(Layout { carrier, band: band::centered(field, share), warnings })
+}
+
+pub(super) fn pattern(
+    field: &Field,
+    settings: &OffAxis,
+    fringe: Fringe,
+    progress: &Progress,
+) -> Result<EncodedPattern> {
+    let ratio = settings.reference_ratio;
+    if !(ratio > 0.0 && ratio.is_finite()) {
+        return Err(Error::parameter("reference_ratio", format!("{ratio} must be greater than zero")));
+    }
+    let Layout { carrier, band: aperture, mut warnings } = layout(field, settings, fringe)?;
+    let (target, dropped) = band::limit(field, &aperture);
+    progress.advance(1);
+    progress.check()?;
+    let amplitude = amplitude_at(&target, settings.percentile)?;
+    if amplitude == 0.0 {
+        let what = "no light within the fringes' band; take another carrier, or move the object nearer to the axis";
+        return Err(Error::parameter("bandwidth", what));
+    }
+    if dropped > 0.1 {
+        warnings.push(format!("{:.0} % of the light lies outside the fringes' band and is lost", 100.0 * dropped));
+    }
+    let illumination = Illumination::Plane { frequency: carrier };
+    let mut reference = vec![Complex32::new(1.0, 0.0); target.samples.len()];
+    illuminate(&mut reference, field.grid, field.wavelength, illumination)?;
+    let (brightest, scale) = match fringe {
+        Fringe::Bipolar => (amplitude, 0.25 / f64::from(amplitude)),
+        Fringe::Intensity => {
+            let rho = f64::from(amplitude) * ratio;
+            let brightest = (f64::from(amplitude) + rho).powi(2);
+            (brightest as f32, rho / brightest)
+        }
+    };
+    let rho = amplitude * ratio as f32;
+    let raw = |u: &Complex32, r: &Complex32| match fringe {
+        Fringe::Bipolar => 0.5 + 0.5 * (u * r.conj()).re / brightest,
+        Fringe::Intensity => (u + r * rho).norm_sqr() / brightest,
+    };
+    let transmittance = target.samples.par_iter().zip(&reference).map(|(u, r)| raw(u, r).clamp(0.0, 1.0)).collect();
+    let outside = target.samples.par_iter().zip(&reference).filter(|(u, r)| {
+        // A value on the border up to rounding is not clipped.
+        !(-1e-6..=1.0 + 1e-6).contains(&raw(u, r))
+    });
+    let clipped = outside.count() as f64 / reference.len() as f64;
+    progress.advance(1);
+    let mut parameters = BTreeMap::from([
+        ("carrier".to_owned(), json!(carrier)),
+        ("percentile".to_owned(), json!(settings.percentile)),
+        ("amplitude".to_owned(), json!(amplitude)),
+    ]);
+    if fringe == Fringe::Intensity {
+        parameters.insert("reference_ratio".to_owned(), json!(ratio));
+    }
+    let record = EncodingRecord {
+        method: if fringe == Fringe::Bipolar { "off-axis-bipolar" } else { "off-axis-intensity" }.into(),
+        modulation: Modulation::Amplitude,
+        parameters,
+        illumination,
+        aperture: Some(aperture),
+        scale,
+    };
+    let pattern = Pattern::Fringe(FringePattern::new(field.grid, field.wavelength, transmittance)?);
+    Ok(EncodedPattern { pattern, record, target, clipped, dropped, warnings })
+}
