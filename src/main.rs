@@ -1,7 +1,3 @@
-//! The binary `holodrive`: flags as typed → resolved settings → one library call; bars and prose only here.
+//! The binary `holodrive`.
 
-mod cli;
-
-fn main() -> std::process::ExitCode {
-    cli::main()
-}
+fn main() {}
