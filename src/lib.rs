@@ -55,6 +55,7 @@
 pub mod error;
 pub mod field;
 pub mod files;
+pub mod panel;
 pub mod points;
 pub mod progress;
 pub mod propagation;

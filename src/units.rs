@@ -1,4 +1,4 @@
-//! Lengths and angles as people write them (`8um`, `632.8nm`, `0.25m`, `2deg`) to SI f64 and back.
+//! Lengths, angles, times and rates as people write them (`8um`, `632.8nm`, `2deg`, `10ms`, `60Hz`) to SI f64 and back.
 //!
 //! A bare number is refused: at the border every quantity says its unit.
 
@@ -20,6 +20,12 @@ const LENGTHS: [(&str, f64); 9] = [
 /// Angle units by their factor to radians.
 const ANGLES: [(&str, f64); 4] =
     [("deg", std::f64::consts::PI / 180.0), ("°", std::f64::consts::PI / 180.0), ("mrad", 1e-3), ("rad", 1.0)];
+
+/// Time units by their factor to seconds.
+const TIMES: [(&str, f64); 4] = [("us", 1e-6), ("µs", 1e-6), ("ms", 1e-3), ("s", 1.0)];
+
+/// Frequency units by their factor to hertz.
+const FREQUENCIES: [(&str, f64); 3] = [("Hz", 1.0), ("kHz", 1e3), ("MHz", 1e6)];
 
 fn parse(text: &str, units: &[(&str, f64)], kind: &'static str, example: &str) -> Result<f64> {
     let text = text.trim();
@@ -67,6 +73,22 @@ pub fn angle(text: &str) -> Result<f64> {
     parse(text, &ANGLES, "angle", "2deg, 35mrad")
 }
 
+/// Reads a time with its unit that is not negative: `10ms` → 0.01 [s].
+pub fn duration(text: &str) -> Result<f64> {
+    let value = parse(text, &TIMES, "time", "10ms, 0.5s")?;
+    if value >= 0.0 { Ok(value) } else { Err(Error::parameter("time", format!("`{text}` must not be negative"))) }
+}
+
+/// Reads a positive rate with its unit: `60Hz` → 60 [Hz].
+pub fn frequency(text: &str) -> Result<f64> {
+    let value = parse(text, &FREQUENCIES, "frequency", "60Hz, 1.44kHz")?;
+    if value > 0.0 {
+        Ok(value)
+    } else {
+        Err(Error::parameter("frequency", format!("`{text}` must be greater than zero")))
+    }
+}
+
 /// Prints a length [m] with the unit that keeps it between 1 and 1000, to at most six significant digits.
 pub fn show_length(metres: f64) -> String {
     let magnitude = metres.abs();
@@ -103,6 +125,9 @@ mod tests {
             assert!((value - metres).abs() <= 1e-15 * metres.abs().max(1e-9), "{text}: {value} is not {metres}");
         }
         assert!((angle("180deg").expect("deg") - std::f64::consts::PI).abs() < 1e-15);
+        assert!((duration("10ms").expect("ms") - 0.01).abs() < 1e-18);
+        assert!((frequency("1.44kHz").expect("kHz") - 1440.0).abs() < 1e-9);
+        assert!(duration("-1s").is_err() && duration("5Hz").is_err() && frequency("0Hz").is_err());
         assert!((angle("5mrad").expect("mrad") - 0.005).abs() < 1e-18);
     }
 

@@ -1,0 +1,73 @@
+//! Panels: what they are, what they are driven with, and what light they make of it.
+//!
+//! The order in which a pattern becomes a signal is fixed:
+//!
+//! ```text
+//! pattern + wavefront correction ─▶ wrap to one turn ─▶ level curve ─▶ Frame ─▶ packing ─▶ VideoFrame
+//! ```
+//!
+//! What has been done stands in the frame's metadata ([`frame::Applied`]), so that nothing is done twice.
+
+pub mod drive;
+pub mod frame;
+mod frame_file;
+pub mod packing;
+pub mod profile;
+mod profile_file;
+pub mod response;
+pub mod wavefront;
+
+pub use drive::{Driven, Pattern, correct, drive};
+pub use frame::{Aperture, ApertureShape, Applied, EncodingRecord, Frame, FrameMetadata, Illumination, Origin};
+pub use packing::{Packing, SignalLayout, VideoFrame};
+pub use profile::{PanelKind, PanelProfile};
+pub use response::{Curve, DriveCurve, Modulation, PhaseSign, Response};
+pub use wavefront::Wavefront;
+
+use crate::error::{Error, Result};
+use crate::field::Grid;
+
+/// Phases that a phase panel should show.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhasePattern {
+    /// Where the pixels stand.
+    pub grid: Grid,
+    /// Wavelength at which the phases hold [m].
+    pub wavelength: f64,
+    /// Phase of each pixel [rad], any turn, row-major.
+    pub phase: Vec<f32>,
+}
+
+/// Amplitude transmittances that an amplitude panel should show.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FringePattern {
+    /// Where the pixels stand.
+    pub grid: Grid,
+    /// Wavelength of the light that the fringes are for [m].
+    pub wavelength: f64,
+    /// Amplitude transmittance of each pixel, 0 … 1, row-major.
+    pub transmittance: Vec<f32>,
+}
+
+impl PhasePattern {
+    /// A pattern from its phases [rad]; refused when their number is not the grid's.
+    pub fn new(grid: Grid, wavelength: f64, phase: Vec<f32>) -> Result<Self> {
+        fits(grid, phase.len())?;
+        Ok(Self { grid, wavelength, phase })
+    }
+}
+
+impl FringePattern {
+    /// A pattern from its amplitude transmittances; refused when their number is not the grid's.
+    pub fn new(grid: Grid, wavelength: f64, transmittance: Vec<f32>) -> Result<Self> {
+        fits(grid, transmittance.len())?;
+        Ok(Self { grid, wavelength, transmittance })
+    }
+}
+
+fn fits(grid: Grid, count: usize) -> Result<()> {
+    if count == grid.len() {
+        return Ok(());
+    }
+    Err(Error::parameter("pattern", format!("{count} values for a grid of {}×{}", grid.width, grid.height)))
+}

@@ -1,0 +1,367 @@
+//! Drive level → modulation: what a panel does to light at each of its levels, and which level comes nearest to a wish.
+
+use crate::error::{Error, Result};
+use crate::field::Complex64;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+
+/// What a panel (or a pattern) modulates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Modulation {
+    /// Phase at constant amplitude.
+    Phase,
+    /// Amplitude transmittance at constant phase.
+    Amplitude,
+}
+
+/// Level → modulation as a profile states it, at one wavelength or (where `wavelength` is absent) at any.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Response {
+    /// Wavelength at which the curve was measured [m]; absent: the panel is set up for whatever wavelength is chosen.
+    pub wavelength: Option<f64>,
+    /// The curve.
+    pub curve: Curve,
+}
+
+/// Shapes of a level → modulation curve. L runs over the panel's levels, 0 … 2^bits − 1.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Curve {
+    /// Phase 2π·L / `levels_for_2pi`.
+    Linear {
+        /// Number of levels that make one turn (may exceed the panel's: then its range stays below 2π).
+        levels_for_2pi: f64,
+    },
+    /// One phase a level [rad], unwrapped, strictly monotone.
+    Table {
+        /// Phase of each level [rad].
+        phase: Vec<f64>,
+    },
+    /// Phase Σ cᵢ·xⁱ [rad] with x = L / (levels − 1), strictly monotone.
+    Polynomial {
+        /// Coefficients c₀, c₁ … [rad].
+        coefficients: Vec<f64>,
+    },
+    /// Piston mirror: height h of each level [m]; its phase is 4πh/λ (the path changes twice).
+    Piston {
+        /// Height of each level [m].
+        height: Vec<f64>,
+    },
+    /// Amplitude transmittance of each level, 0 … 1.
+    Transmittance {
+        /// Amplitude transmittance of each level.
+        amplitude: Vec<f64>,
+    },
+    /// Amplitude transmittance L / (levels − 1).
+    LinearAmplitude,
+}
+
+impl Curve {
+    /// What the curve modulates.
+    pub fn modulation(&self) -> Modulation {
+        match self {
+            Self::Transmittance { .. } | Self::LinearAmplitude => Modulation::Amplitude,
+            _ => Modulation::Phase,
+        }
+    }
+
+    /// Refuses a curve that does not fit a panel of `levels` levels; `path` is the profile that it stands in.
+    pub fn check(&self, levels: usize, path: &Path) -> Result<()> {
+        let refuse = |what: String| Err(Error::calibration(path, what));
+        let (values, name) = match self {
+            Self::Linear { levels_for_2pi } => {
+                // One level a turn can show no phase but zero.
+                return if levels_for_2pi.is_finite() && *levels_for_2pi > 1.0 {
+                    Ok(())
+                } else {
+                    refuse(format!("response.levels_for_2pi = {levels_for_2pi} must be greater than 1"))
+                };
+            }
+            Self::LinearAmplitude => return Ok(()),
+            Self::Polynomial { coefficients } => {
+                if coefficients.len() < 2 || coefficients.iter().any(|c| !c.is_finite()) {
+                    return refuse("response.coefficients needs two or more finite numbers".into());
+                }
+                (self.phases(levels, f64::NAN), "coefficients")
+            }
+            Self::Table { phase } => (phase.clone(), "values"),
+            Self::Piston { height } => (height.clone(), "heights"),
+            Self::Transmittance { amplitude } => (amplitude.clone(), "values"),
+        };
+        if values.len() != levels {
+            let count = values.len();
+            return refuse(format!(
+                "response.{name} has {count} entries; the panel has {levels} levels: give one each"
+            ));
+        }
+        if let Some(level) = values.iter().position(|v| !v.is_finite()) {
+            return refuse(format!("response.{name}: level {level} is not finite"));
+        }
+        match self {
+            Self::Transmittance { .. } => match values.iter().position(|v| !(0.0..=1.0).contains(v)) {
+                Some(level) => {
+                    refuse(format!("response.{name}: level {level} is {}, an amplitude is 0 … 1", values[level]))
+                }
+                None => Ok(()),
+            },
+            // A mirror's codes need not be in the order of its heights.
+            Self::Piston { .. } => Ok(()),
+            _ => match non_monotone(&values) {
+                Some(level) => refuse(format!(
+                    "response.{name}: the phase turns back at level {level}; a level → phase curve must rise or fall all the way"
+                )),
+                None => Ok(()),
+            },
+        }
+    }
+
+    /// Unwrapped phase of each level [rad] at a wavelength [m] (which only [`Curve::Piston`] needs); empty for an
+    /// amplitude curve.
+    fn phases(&self, levels: usize, wavelength: f64) -> Vec<f64> {
+        match self {
+            Self::Linear { levels_for_2pi } => (0..levels).map(|l| TAU * l as f64 / levels_for_2pi).collect(),
+            Self::Table { phase } => phase.clone(),
+            Self::Polynomial { coefficients } => (0..levels)
+                .map(|l| {
+                    let x = l as f64 / (levels.max(2) - 1) as f64;
+                    coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
+                })
+                .collect(),
+            Self::Piston { height } => height.iter().map(|h| 4.0 * PI * h / wavelength).collect(),
+            Self::Transmittance { .. } | Self::LinearAmplitude => Vec::new(),
+        }
+    }
+
+    /// The curve worked out level by level at a wavelength [m]; `measured_at` is where a phase curve was measured.
+    ///
+    /// A phase measured at λ₀ is taken as φ·λ₀/λ elsewhere: the optical path is kept, its dispersion neglected.
+    pub(crate) fn resolve(
+        &self,
+        levels: usize,
+        wavelength: f64,
+        measured_at: Option<f64>,
+        sign: PhaseSign,
+    ) -> DriveCurve {
+        match self {
+            Self::Transmittance { amplitude } => DriveCurve::amplitude(amplitude.clone()),
+            Self::LinearAmplitude => {
+                DriveCurve::amplitude((0..levels).map(|l| l as f64 / (levels.max(2) - 1) as f64).collect())
+            }
+            _ => {
+                let mut factor = match sign {
+                    PhaseSign::Increasing => 1.0,
+                    PhaseSign::Decreasing => -1.0,
+                };
+                if let (Some(measured), false) = (measured_at, matches!(self, Self::Piston { .. })) {
+                    factor *= measured / wavelength;
+                }
+                DriveCurve::phase(self.phases(levels, wavelength).into_iter().map(|p| p * factor).collect())
+            }
+        }
+    }
+}
+
+/// The first index at which a sequence stops being strictly monotone.
+pub(crate) fn non_monotone(values: &[f64]) -> Option<usize> {
+    let rising = values.len() < 2 || values[1] > values[0];
+    values.windows(2).position(|w| if rising { w[1] <= w[0] } else { w[1] >= w[0] }).map(|i| i + 1)
+}
+
+/// Whether a higher drive level delays the light more, or less.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PhaseSign {
+    /// Phase rises with the level: phase 0 → level 0, π → the middle.
+    #[default]
+    Increasing,
+    /// Phase falls with the level: the profile's curve is negated.
+    Decreasing,
+}
+
+/// A panel's modulation at one wavelength, level by level, with the search for the nearest level.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriveCurve {
+    modulation: Modulation,
+    /// Unwrapped phase [rad] or amplitude of each level.
+    values: Vec<f64>,
+    /// Usable levels by rising value (phases wrapped to [0, 2π)).
+    sorted: Vec<(f64, u16)>,
+    /// Distance within which a reachable wish finds its level: the widest step between neighbours, gap excluded.
+    step: f64,
+}
+
+impl DriveCurve {
+    /// From unwrapped phases [rad], one a level.
+    ///
+    /// Of a range beyond one turn only the levels of the first turn are used: neighbouring phases then have
+    /// neighbouring levels, which keeps fly-back edges and crosstalk small.
+    pub fn phase(values: Vec<f64>) -> Self {
+        let first = values.first().copied().unwrap_or(0.0);
+        // A curve that rises or falls throughout leaves its first turn once; a mirror's unordered codes are all kept.
+        let usable = match non_monotone(&values) {
+            None => values.iter().position(|v| (v - first).abs() >= TAU - 1e-9).unwrap_or(values.len()),
+            Some(_) => values.len(),
+        };
+        let mut sorted: Vec<(f64, u16)> =
+            values[..usable].iter().enumerate().map(|(l, v)| (v.rem_euclid(TAU), l as u16)).collect();
+        sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut steps: Vec<f64> = sorted.windows(2).map(|w| w[1].0 - w[0].0).collect();
+        steps.push(sorted[0].0 + TAU - sorted[sorted.len() - 1].0);
+        steps.sort_by(f64::total_cmp);
+        // The widest step may be the gap that a range below one turn leaves; the next one is a step of the curve.
+        let step = if steps.len() > 1 { steps[steps.len() - 2] } else { TAU };
+        Self { modulation: Modulation::Phase, values, sorted, step }
+    }
+
+    /// From amplitude transmittances, one a level.
+    pub fn amplitude(values: Vec<f64>) -> Self {
+        let mut sorted: Vec<(f64, u16)> = values.iter().enumerate().map(|(l, &v)| (v, l as u16)).collect();
+        sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let step = sorted.windows(2).map(|w| w[1].0 - w[0].0).fold(0.0, f64::max);
+        Self { modulation: Modulation::Amplitude, values, sorted, step }
+    }
+
+    /// What the levels modulate.
+    pub fn modulation(&self) -> Modulation {
+        self.modulation
+    }
+    /// Number of levels.
+    pub fn levels(&self) -> usize {
+        self.values.len()
+    }
+    /// Unwrapped phase [rad], or amplitude, of each level.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+    /// Levels that [`DriveCurve::nearest`] may answer, with their value (phases in [0, 2π)), by rising value.
+    pub fn usable(&self) -> &[(f64, u16)] {
+        &self.sorted
+    }
+    /// Span of the phases [rad] or amplitudes.
+    pub fn range(&self) -> f64 {
+        let (low, high) =
+            self.values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+        high - low
+    }
+    /// Levels that one turn of phase spans (fractional), where the range and the mean slope tell it.
+    pub fn levels_for_2pi(&self) -> Option<f64> {
+        (self.modulation == Modulation::Phase && self.range() > 0.0)
+            .then(|| TAU * (self.values.len() - 1) as f64 / self.range())
+    }
+    /// What a level does to unit light: exp(iφ), or t.
+    pub fn phasor(&self, level: u16) -> Complex64 {
+        let value = self.values[usize::from(level).min(self.values.len() - 1)];
+        match self.modulation {
+            Modulation::Phase => Complex64::cis(value),
+            Modulation::Amplitude => Complex64::new(value, 0.0),
+        }
+    }
+
+    /// The level nearest to a phase [rad] on the circle, or to an amplitude, and its signed miss (available − wished).
+    pub fn nearest(&self, wish: f64) -> (u16, f64) {
+        match self.modulation {
+            Modulation::Phase => {
+                let wish = wish.rem_euclid(TAU);
+                let at = self.sorted.partition_point(|v| v.0 < wish);
+                let above = self.sorted.get(at).map_or((self.sorted[0].0 + TAU, self.sorted[0].1), |v| *v);
+                let below = match at {
+                    0 => {
+                        let last = self.sorted[self.sorted.len() - 1];
+                        (last.0 - TAU, last.1)
+                    }
+                    _ => self.sorted[at - 1],
+                };
+                closer(wish, below, above)
+            }
+            Modulation::Amplitude => {
+                let at = self.sorted.partition_point(|v| v.0 < wish);
+                let above = self.sorted[at.min(self.sorted.len() - 1)];
+                let below = self.sorted[at.saturating_sub(1)];
+                closer(wish, below, above)
+            }
+        }
+    }
+
+    /// Whether a miss of [`DriveCurve::nearest`] is more than rounding: the wish lies outside what the panel can show.
+    pub fn unreachable(&self, miss: f64) -> bool {
+        // Half a step is rounding; the margin keeps wishes exactly between two levels on the reachable side.
+        miss.abs() > 0.5 * self.step + 1e-6
+    }
+}
+
+fn closer(wish: f64, below: (f64, u16), above: (f64, u16)) -> (u16, f64) {
+    let (under, over) = (wish - below.0, above.0 - wish);
+    if under.abs() <= over.abs() { (below.1, -under) } else { (above.1, over) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn brute(curve: &DriveCurve, wish: f64) -> f64 {
+        let miss = |v: f64| match curve.modulation() {
+            Modulation::Phase => (v - wish + PI).rem_euclid(TAU) - PI,
+            Modulation::Amplitude => v - wish,
+        };
+        curve.usable().iter().map(|v| miss(v.0).abs()).fold(f64::INFINITY, f64::min)
+    }
+
+    #[test]
+    fn nearest_level_is_nearest_on_the_circle() {
+        let curves = [
+            Curve::Linear { levels_for_2pi: 256.0 }.resolve(256, 5e-7, None, PhaseSign::Increasing),
+            Curve::Linear { levels_for_2pi: 100.0 }.resolve(256, 5e-7, None, PhaseSign::Decreasing),
+            Curve::Linear { levels_for_2pi: 320.0 }.resolve(256, 5e-7, None, PhaseSign::Increasing),
+            Curve::Polynomial { coefficients: vec![0.3, 2.0, 2.5] }.resolve(16, 5e-7, None, PhaseSign::Increasing),
+            Curve::Piston { height: vec![0.0, 30e-9, 10e-9, 200e-9] }.resolve(4, 5e-7, None, PhaseSign::Increasing),
+            Curve::Transmittance { amplitude: vec![0.0, 0.1, 0.7, 1.0] }.resolve(4, 5e-7, None, PhaseSign::Increasing),
+        ];
+        for curve in &curves {
+            for i in -300..600 {
+                let wish = 0.0173 * f64::from(i);
+                let (level, miss) = curve.nearest(wish);
+                assert!((miss.abs() - brute(curve, wish)).abs() < 1e-12, "{wish}");
+                let made = curve.phasor(level);
+                let told = match curve.modulation() {
+                    Modulation::Phase => Complex64::cis(wish + miss),
+                    Modulation::Amplitude => Complex64::new(wish + miss, 0.0),
+                };
+                assert!((made - told).norm() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_range_above_one_turn_uses_the_first_turn_and_one_below_leaves_a_gap() {
+        let wide = Curve::Linear { levels_for_2pi: 64.0 }.resolve(256, 5e-7, None, PhaseSign::Increasing);
+        assert!((0..1000).all(|i| wide.nearest(0.01 * f64::from(i)).0 < 64));
+        // 1.6π of range: the gap is 0.4π wide, its middle 0.2π from the nearest level.
+        let narrow = Curve::Linear { levels_for_2pi: 320.0 }.resolve(257, 5e-7, None, PhaseSign::Increasing);
+        let (_, miss) = narrow.nearest(1.8 * PI);
+        assert!((miss.abs() - 0.2 * PI).abs() < 1e-9 && narrow.unreachable(miss));
+        let (_, miss) = narrow.nearest(1.003 * PI);
+        assert!(!narrow.unreachable(miss));
+        assert!((narrow.range() - 1.6 * PI).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_measured_curve_keeps_its_optical_path_at_another_wavelength() {
+        let curve = Curve::Table { phase: vec![0.0, 1.0, 2.0] };
+        let elsewhere = curve.resolve(3, 500e-9, Some(600e-9), PhaseSign::Increasing);
+        assert!((elsewhere.values()[2] - 2.4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn bad_curves_are_refused_with_the_level_that_breaks_them() {
+        let path = Path::new("x.toml");
+        let text = |curve: Curve| curve.check(4, path).expect_err("refused").to_string();
+        assert!(text(Curve::Table { phase: vec![0.0, 1.0, 0.5, 2.0] }).contains("level 2"));
+        assert!(text(Curve::Table { phase: vec![0.0, 1.0] }).contains("2 entries"));
+        assert!(text(Curve::Polynomial { coefficients: vec![0.0, 1.0, -1.0] }).contains("turns back"));
+        assert!(text(Curve::Linear { levels_for_2pi: 0.0 }).contains("greater than 1"));
+        assert!(text(Curve::Transmittance { amplitude: vec![0.0, 0.5, 1.5, 1.0] }).contains("level 2"));
+        assert!(Curve::Piston { height: vec![0.0, 2e-7, 1e-7, 3e-7] }.check(4, path).is_ok());
+    }
+}
