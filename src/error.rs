@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 /// What went wrong, where, and what to do about it. One line when printed.
 ///
-/// The binary maps every variant to exit code 2 except [`Error::Interrupted`] (130) and
-/// [`Error::Io`] on a healthy path (1); see the crate documentation.
+/// The binary maps every variant to exit code 2 except [`Error::Interrupted`] (130).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -35,7 +35,22 @@
 //!
 //! # Rooms, from the ground up
 //!
-//! A module uses only modules that stand above it in this list; `tests/layering.rs` keeps it so.
+//! A room uses only rooms that stand above it in this list; `tests/layering.rs` reads the list and keeps it so.
+//!
+//! 1. [`error`]: one error type, variants sorted by who can act
+//! 2. [`progress`]: how long work tells that it moves on, and is told to stop
+//! 3. [`units`]: lengths and angles with units
+//! 4. [`files`]: files that appear whole or not at all
+//! 5. [`random`]: random numbers by seed and index
+//! 6. [`field`]: complex samples on a grid; index ↔ metre ↔ cycles/m; Fourier transforms; `.npy`
+//! 7. [`scene`]: glTF, triangles, materials, textures, lights, cameras, ray casting
+//! 8. [`illumination`]: light arriving on surfaces: form factors, radiosity, direct light
+//! 9. [`points`]: rays to point sources; placement before the panel; PLY; pictures with depth
+//! 10. [`propagation`]: plane to plane
+//! 12. [`panel`]: profiles, frames of drive levels, packing, the simulated panel
+//! 13. [`encode`]: field to phase or fringes for a panel's levels and range
+//! 14. [`reconstruction`]: field to pictures, and how good they are
+//! 16. [`display`]: monitors and the fullscreen window (feature `display`)
 
 pub mod encode;
 pub mod error;

@@ -22,12 +22,29 @@ pub struct FieldMetadata {
     /// Middle of the grid in the hologram frame [m].
     #[serde(default)]
     pub center: [f64; 2],
-    /// Distance of the field's plane in front of the panel, z [m].
+    /// Where the field's plane and its content stand.
     #[serde(default)]
-    pub z: f64,
+    pub content: Content,
     /// Where the field comes from, and the sign convention, in words.
     #[serde(default)]
     pub origin: String,
+}
+
+/// Where a field's plane stands, and the content that it shows: what a reconstruction needs to know.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Content {
+    /// Distance of the field's plane in front of the panel, z [m].
+    #[serde(default)]
+    pub z: f64,
+    /// Depths z of the nearest and the farthest content in the hologram frame [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth: Option<[f64; 2]>,
+    /// Eye that the content was placed for [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub eye: Option<[f64; 3]>,
+    /// Half width and half height of the viewing window on the panel plane [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub window: Option<[f64; 2]>,
 }
 
 /// The convention that every field file states.
@@ -42,14 +59,14 @@ pub fn metadata_path(path: &Path) -> PathBuf {
 }
 
 /// Writes the field as H×W complex64, and its metadata beside it.
-pub fn write_field(path: &Path, field: &Field, z: f64, origin: &str) -> Result<()> {
+pub fn write_field(path: &Path, field: &Field, content: &Content, origin: &str) -> Result<()> {
     write(path, &[field.grid.height as u64, field.grid.width as u64], field.samples.iter().copied())?;
     let metadata = FieldMetadata {
         wavelength: field.wavelength,
         pitch: [field.grid.pitch_x, field.grid.pitch_y],
         center: field.grid.center,
-        z,
-        origin: format!("{origin}; {CONVENTION}"),
+        content: *content,
+        origin: if origin.ends_with(CONVENTION) { origin.into() } else { format!("{origin}; {CONVENTION}") },
     };
     let text = serde_json::to_string_pretty(&metadata).map_err(|e| Error::input(path, e.to_string()))?;
     files::write_bytes(&metadata_path(path), text.as_bytes())
@@ -58,6 +75,11 @@ pub fn write_field(path: &Path, field: &Field, z: f64, origin: &str) -> Result<(
 /// Writes an H×W×3 float32 picture of linear radiance, row 0 on top.
 pub fn write_picture(path: &Path, width: usize, height: usize, rgb: &[[f32; 3]]) -> Result<()> {
     write(path, &[height as u64, width as u64, 3], rgb.iter().flatten().copied())
+}
+
+/// Writes an H×W float32 picture of linear intensity, row 0 on top.
+pub fn write_intensity(path: &Path, width: usize, height: usize, values: &[f32]) -> Result<()> {
+    write(path, &[height as u64, width as u64], values.iter().copied())
 }
 
 fn write<T: npyz::AutoSerialize>(path: &Path, shape: &[u64], values: impl Iterator<Item = T>) -> Result<()> {
@@ -164,9 +186,9 @@ pub fn read_field(path: &Path, pitch: Option<[f64; 2]>, wavelength: Option<f64>)
     }
     let center = beside.as_ref().map_or([0.0; 2], |m| m.center);
     let grid = Grid::new(array.width, array.height, pitch[0], pitch[1])?.centered_at(center);
-    let z = beside.as_ref().map_or(0.0, |m| m.z);
+    let content = beside.as_ref().map_or_else(Content::default, |m| m.content);
     let origin = beside.map_or_else(String::new, |m| m.origin);
-    let metadata = FieldMetadata { wavelength, pitch, center, z, origin };
+    let metadata = FieldMetadata { wavelength, pitch, center, content, origin };
     Ok((Field::new(grid, wavelength, array.values)?, metadata))
 }
 
@@ -207,10 +229,11 @@ mod tests {
         let grid = Grid::new(5, 3, 8e-6, 9e-6).expect("grid").centered_at([1e-3, -2e-3]);
         let samples = (0..15).map(|i| Complex32::new(i as f32, -0.5 * i as f32)).collect();
         let field = Field::new(grid, 532e-9, samples).expect("field");
-        write_field(&path, &field, 0.25, "test").expect("write");
+        let content = Content { z: 0.25, depth: Some([-0.1, -0.2]), ..Content::default() };
+        write_field(&path, &field, &content, "test").expect("write");
         let (back, metadata) = read_field(&path, None, None).expect("read");
         assert_eq!(back, field);
-        assert_eq!(metadata.z, 0.25);
+        assert_eq!(metadata.content, content);
         std::fs::remove_file(metadata_path(&path)).expect("remove");
         let refused = read_field(&path, Some([8e-6, 9e-6]), None).unwrap_err().to_string();
         assert!(refused.contains("--wavelength"), "{refused}");

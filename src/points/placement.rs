@@ -143,12 +143,12 @@ impl Placement {
                     DMat4::from_translation(DVec3::new(0.0, 0.0, z)) * rotate * DMat4::from_translation(-center);
                 let world_from_hologram = hologram_from_world.inverse();
                 let eye = DVec3::new(0.0, 0.0, eye);
+                let aspect = window.x / window.y;
                 let camera = Camera {
                     name: "eye".into(),
                     world_from_camera: DMat4::from_mat3_translation(axes, world_from_hologram.transform_point3(eye)),
-                    projection: Projection::Perspective { yfov: 2.0 * (window.y / eye.z).atan(), aspect: None },
+                    projection: Projection::Perspective { yfov: 2.0 * (window.y / eye.z).atan(), aspect: Some(aspect) },
                 };
-                let aspect = window.x / window.y;
                 Ok(Placing { camera, aspect, eye, window, map: Map::Model { hologram_from_world } })
             }
         }

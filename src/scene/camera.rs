@@ -39,14 +39,19 @@ impl Camera {
         self.world_from_camera.w_axis.truncate()
     }
     /// Half width and half height of the picture on the plane at distance 1 m (perspective) or anywhere
-    /// (orthographic) [m]. A picture whose shape is not the camera's keeps the vertical angle of view.
+    /// (orthographic) [m]. A picture whose shape is not the camera's keeps the height of the view, and is never squeezed.
     pub fn half_size(&self, picture_aspect: f64) -> (f64, f64) {
+        let half_height = match self.projection {
+            Projection::Perspective { yfov, .. } => (0.5 * yfov).tan(),
+            Projection::Orthographic { ymag, .. } => ymag,
+        };
+        (half_height * picture_aspect, half_height)
+    }
+    /// Width over height of the picture that the camera asks for; `None` leaves it to the picture.
+    pub fn aspect(&self) -> Option<f64> {
         match self.projection {
-            Projection::Perspective { yfov, aspect } => {
-                let half_height = (0.5 * yfov).tan();
-                (half_height * aspect.unwrap_or(picture_aspect), half_height)
-            }
-            Projection::Orthographic { xmag, ymag } => (xmag, ymag),
+            Projection::Perspective { aspect, .. } => aspect,
+            Projection::Orthographic { xmag, ymag } => Some(xmag / ymag),
         }
     }
     /// Ray through the picture at (u, v) ∈ [0, 1]², u to the right, v downwards (row 0 on top). Unit direction.
@@ -87,5 +92,11 @@ mod tests {
         let expected = DVec3::new(-2.0, 1.0, -1.0).normalize();
         assert!((top_left.direction - expected).length() < 1e-12);
         assert!((camera.ray(0.5, 0.5, 2.0).direction - DVec3::NEG_Z).length() < 1e-12);
+        let mut parallel = camera.clone();
+        parallel.projection = Projection::Orthographic { xmag: 3.0, ymag: 2.0 };
+        assert_eq!(parallel.aspect(), Some(1.5));
+        let top_left = parallel.ray(0.0, 0.0, 1.5);
+        assert!((top_left.origin - DVec3::new(-3.0, 2.0, 5.0)).length() < 1e-12);
+        assert!((top_left.direction - DVec3::NEG_Z).length() < 1e-12);
     }
 }

@@ -5,7 +5,7 @@
 
 pub mod bvh;
 pub mod camera;
-// pub mod gltf;
+pub mod gltf;
 pub mod material;
 pub mod texture;
 

@@ -1,0 +1,124 @@
+//! glTF 2.0 files to [`Scene`]: the only place that names the crate `gltf`.
+//!
+//! Of that crate only the schema (`gltf::json`) is used. Its own validation and its accessor iterators panic on some
+//! malformed files, so every index is looked up here with a check, and every byte range is checked before it is read:
+//! a malformed file is an [`Error::Input`](crate::Error::Input) in one line that says what is wrong and where.
+//!
+//! # What is read
+//!
+//! `.gltf` and `.glb`; buffers and images in the file, in data URIs or in files beside it; node trees with matrices,
+//! mirrored and shared meshes; triangles, strips and fans, with or without indices; sparse accessors; normals, two sets
+//! of texture coordinates, vertex colours; skins and morph targets, posed by an animation clip at a time; cameras;
+//! PNG and JPEG textures with sampler and transform; metallic-roughness materials; the extensions
+//! [`UNDERSTOOD_EXTENSIONS`]. Points and lines have no surface: they are left out with a warning.
+//!
+//! # Assumptions, each with a warning
+//!
+//! A file without a camera gets one that frames the scene; a file without light gets the one that [`load`] states.
+//! An image that cannot be decoded leaves its factor in use; an optional extension that is not understood is left out.
+//!
+//! # Limits
+//!
+//! [`MAX_TRIANGLES`], [`MAX_COORDINATE`], [`MAX_TEXTURE_SIDE`], [`MAX_FILE_BYTES`].
+
+mod accessor;
+mod animation;
+mod cameras;
+mod document;
+mod images;
+mod lights;
+mod materials;
+mod meshes;
+mod nodes;
+mod primitives;
+mod resources;
+
+pub use document::UNDERSTOOD_EXTENSIONS;
+pub use images::MAX_TEXTURE_SIDE;
+pub use meshes::{MAX_COORDINATE, MAX_TRIANGLES};
+pub use resources::MAX_FILE_BYTES;
+
+use super::{Scene, Warning};
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// One of several things in a file, by its name or its number from 0.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// The one with this name.
+    Name(String),
+    /// The one with this number, counted from 0.
+    Index(usize),
+}
+
+impl From<&str> for Choice {
+    /// Digits alone are a number, everything else is a name.
+    fn from(text: &str) -> Self {
+        text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Index)
+    }
+}
+
+/// Which animation clip poses the scene.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Clip {
+    /// The first one in the file, if there is one.
+    #[default]
+    First,
+    /// None: nodes stand as they are written.
+    Rest,
+    /// A certain one.
+    Of(Choice),
+}
+
+/// What to load of a file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LoadOptions {
+    /// The camera that comes first in [`Scene::cameras`]; by the name of the camera or its node, or by number in the
+    /// order of the node tree. `None`: the first one.
+    pub camera: Option<Choice>,
+    /// The scene of the file. `None`: the file's default scene, or its first.
+    pub scene: Option<Choice>,
+    /// The animation clip that poses nodes, skins and morph targets.
+    pub clip: Clip,
+    /// Time in the clip [s]; before its first or after its last key the pose of that key is held.
+    pub time: f64,
+}
+
+/// A scene and what had to be assumed to make it.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The scene; it has at least one triangle, one camera and some light.
+    pub scene: Scene,
+    /// Assumptions and omissions, in the order in which they were made.
+    pub warnings: Vec<Warning>,
+}
+
+/// Loads the glTF file at `path`, flattened into world-space triangles.
+///
+/// A file that lights nothing (no emission, no punctual light, not everything unlit) is lit by a directional light of
+/// irradiance 2.2 W/m² from the viewer's upper left and by a point light at the first camera that gives 0.8 W/m² at the
+/// middle of the scene, so that a white surface square to both has a radiance of about 1 W/(m² sr).
+///
+/// # Errors
+///
+/// [`Error::Input`] for a file that is missing, malformed, needs an extension that is not understood, has no triangle,
+/// passes a limit, or has lights that all have no intensity; [`Error::Parameter`] for a camera, scene, clip or time
+/// that the file does not have.
+pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
+    if !options.time.is_finite() {
+        return Err(Error::parameter("--time", format!("{} is not a time; give seconds, such as 1.5s", options.time)));
+    }
+    let mut warnings = Vec::new();
+    let document = document::Document::open(path, &mut warnings)?;
+    let pose = animation::Pose::new(&document, &options.clip, options.time)?;
+    let nodes = nodes::Nodes::new(&document, &pose, options.scene.as_ref())?;
+
+    let (triangles, used_materials) = meshes::triangles(&document, &nodes, &pose, &mut warnings)?;
+    let (materials, textures) = materials::read(&document, &used_materials, &mut warnings)?;
+    let cameras = cameras::read(&document, &nodes, options.camera.as_ref(), &triangles, &mut warnings)?;
+    let lights = lights::read(&document, &nodes)?;
+
+    let mut scene = Scene { triangles, materials, textures, lights, cameras };
+    lights::ensure_light(&document, &mut scene, &used_materials, &mut warnings)?;
+    Ok(Loaded { scene, warnings })
+}

@@ -1,0 +1,109 @@
+//! The node tree: which nodes the chosen scene shows, and where they stand.
+
+use super::Choice;
+use super::animation::Pose;
+use super::document::{Document, choose};
+use crate::error::Result;
+use glam::DMat4;
+use gltf::json;
+
+/// Where every node of the file stands, and which ones are shown.
+pub(super) struct Nodes {
+    /// World from node, for all nodes of the file.
+    pub(super) world_from_node: Vec<DMat4>,
+    /// Numbers of the nodes of the chosen scene, parents before children, in the order of the file.
+    pub(super) shown: Vec<usize>,
+}
+
+impl Nodes {
+    /// Checks that the nodes form trees and multiplies their transforms.
+    pub(super) fn new(document: &Document, pose: &Pose, scene: Option<&Choice>) -> Result<Self> {
+        let nodes = &document.root.nodes;
+        let parents = parents(document)?;
+        let roots = (0..nodes.len()).filter(|&n| parents[n].is_none());
+        let mut world_from_node = vec![DMat4::IDENTITY; nodes.len()];
+        let mut reached = 0;
+        for node in depth_first(nodes, roots.collect()) {
+            let above = parents[node].map_or(DMat4::IDENTITY, |parent| world_from_node[parent]);
+            world_from_node[node] = above * pose.parent_from_node[node];
+            reached += 1;
+            if !world_from_node[node].is_finite() {
+                return Err(document.error(format!("{} has a transform that is not finite", node_name(document, node))));
+            }
+        }
+        // Each node has at most one parent, so that whatever no root reaches hangs on a ring.
+        if reached < nodes.len() {
+            return Err(document.error("its nodes form a ring (a node is its own ancestor); glTF requires a tree"));
+        }
+
+        let shown = match chosen_scene(document, scene)? {
+            Some(scene) => {
+                let mut tops = Vec::with_capacity(scene.nodes.len());
+                for &index in &scene.nodes {
+                    document.get(index, "a scene's node list")?;
+                    tops.push(index.value());
+                }
+                let shown = depth_first(nodes, tops);
+                let mut seen = vec![false; nodes.len()];
+                for &node in &shown {
+                    if std::mem::replace(&mut seen[node], true) {
+                        let name = node_name(document, node);
+                        return Err(document.error(format!("the scene lists {name} twice; glTF requires a tree")));
+                    }
+                }
+                shown
+            }
+            // A file without scenes is a library of parts; all of it is shown.
+            None => depth_first(nodes, (0..nodes.len()).filter(|&n| parents[n].is_none()).collect()),
+        };
+        Ok(Self { world_from_node, shown })
+    }
+}
+
+/// How a node is called in messages.
+pub(super) fn node_name(document: &Document, node: usize) -> String {
+    match document.root.nodes.get(node).and_then(|n| n.name.as_deref()) {
+        Some(name) => format!("node {node} '{name}'"),
+        None => format!("node {node}"),
+    }
+}
+
+fn parents(document: &Document) -> Result<Vec<Option<usize>>> {
+    let nodes = &document.root.nodes;
+    let mut parents = vec![None; nodes.len()];
+    for (parent, node) in nodes.iter().enumerate() {
+        for &child in node.children.iter().flatten() {
+            document.get(child, "a node's child list")?;
+            if parents[child.value()].replace(parent).is_some() {
+                let name = node_name(document, child.value());
+                return Err(document.error(format!("{name} has two parents; glTF requires a tree")));
+            }
+        }
+    }
+    Ok(parents)
+}
+
+/// Nodes under `tops`, parents before children. Children are known to exist and to have one parent each, so that the
+/// walk ends; it keeps its own stack, so that a deep tree cannot overflow the thread's.
+fn depth_first(nodes: &[json::Node], tops: Vec<usize>) -> Vec<usize> {
+    let mut stack = tops;
+    stack.reverse();
+    let mut order = Vec::with_capacity(nodes.len());
+    while let Some(node) = stack.pop() {
+        order.push(node);
+        stack.extend(nodes[node].children.iter().flatten().rev().map(json::Index::value));
+    }
+    order
+}
+
+fn chosen_scene<'a>(document: &'a Document, scene: Option<&Choice>) -> Result<Option<&'a json::Scene>> {
+    let root = &document.root;
+    if let Some(choice) = scene {
+        let names: Vec<Vec<&str>> = root.scenes.iter().map(|s| s.name.as_deref().into_iter().collect()).collect();
+        return Ok(Some(&root.scenes[choose(choice, &names, "--scene", "scene")?]));
+    }
+    match root.scene {
+        Some(index) => Ok(Some(document.get(index, "the default scene")?)),
+        None => Ok(root.scenes.first()),
+    }
+}
