@@ -40,6 +40,7 @@
 pub mod error;
 pub mod field;
 pub mod files;
+pub mod hologram;
 pub mod points;
 pub mod progress;
 pub mod random;
