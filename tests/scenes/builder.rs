@@ -47,9 +47,7 @@ impl Builder {
     }
 
     pub(crate) fn view(&mut self, bytes: &[u8]) -> usize {
-        while self.data.len() % 4 != 0 {
-            self.data.push(0);
-        }
+        self.data.resize(self.data.len().next_multiple_of(4), 0);
         let offset = self.data.len();
         self.data.extend_from_slice(bytes);
         self.push("bufferViews", json!({"buffer": 0, "byteOffset": offset, "byteLength": bytes.len()}))
@@ -102,9 +100,7 @@ impl Builder {
             document["buffers"] = json!([{"byteLength": self.data.len()}]);
         }
         let mut text = document.to_string().into_bytes();
-        while text.len() % 4 != 0 {
-            text.push(b' ');
-        }
+        text.resize(text.len().next_multiple_of(4), b' ');
         let mut data = self.data.clone();
         data.resize(data.len().next_multiple_of(4), 0);
         let word = |n: usize| (n as u32).to_le_bytes();
