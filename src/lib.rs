@@ -37,6 +37,8 @@
 //!
 //! A module uses only modules that stand above it in this list; `tests/layering.rs` keeps it so.
 
+#[cfg(feature = "display")]
+pub mod display;
 pub mod error;
 pub mod field;
 pub mod files;
