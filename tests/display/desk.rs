@@ -153,11 +153,20 @@ impl Desk {
         cursor.cursor_image.iter().filter(|&&pixel| pixel >> 24 != 0).count()
     }
 
-    /// Maps a window of the test's own and raises it above all.
-    pub(crate) fn raise_other_window(&self, x: i16, y: i16, width: u16, height: u16) -> u32 {
+    /// Whether a window manager says that it is at work.
+    pub(crate) fn window_manager_is_there(&self) -> bool {
+        let c = &self.connection;
+        let name = c.intern_atom(false, b"_NET_SUPPORTING_WM_CHECK").expect("atom").reply().expect("atom").atom;
+        let check = c.get_property(false, self.root, name, AtomEnum::WINDOW, 0, 1).expect("property");
+        let window = check.reply().expect("property").value32().and_then(|mut values| values.next());
+        window.is_some_and(|window| c.get_geometry(window).expect("geometry").reply().is_ok())
+    }
+
+    /// Maps a window of the test's own and raises it above all; the window manager is asked if it is `managed`.
+    pub(crate) fn raise_other_window(&self, x: i16, y: i16, width: u16, height: u16, managed: bool) -> u32 {
         let c = &self.connection;
         let window = c.generate_id().expect("id");
-        let look = CreateWindowAux::new().background_pixel(0x00FF_00FF).override_redirect(1);
+        let look = CreateWindowAux::new().background_pixel(0x00FF_00FF).override_redirect(u32::from(!managed));
         let class = WindowClass::INPUT_OUTPUT;
         c.create_window(24, window, self.root, x, y, width, height, 0, class, 0, &look).expect("window");
         c.map_window(window).expect("map");

@@ -18,7 +18,7 @@ pub(crate) const CASES: &[Case] = &[
 ///
 /// The window opens with another frame than those that are compared: the server itself paints the first one as the
 /// window's background, the rest can only come from the presenter.
-fn exact(desk: &Desk, presenter: &str) -> Ended {
+pub(crate) fn exact(desk: &Desk, presenter: &str) -> Ended {
     for monitor in [PANEL, ODD_PANEL] {
         let plug = desk.plug(monitor);
         let (width, height) = (plug.width.into(), plug.height.into());
@@ -84,7 +84,7 @@ fn fallback(desk: &Desk) -> Ended {
 
 /// Looks at a part of the panel as fast as it can while the window comes up: it must go from what was there to the
 /// frame, with nothing (white, black, half a frame) between.
-fn first(desk: &Desk) -> Ended {
+pub(crate) fn first(desk: &Desk) -> Ended {
     let plug = desk.plug(PANEL);
     let job = ShowJob::new(PANEL, (Pattern::Random(11), 1920, 1080), "software");
     let whole = job.picture();
