@@ -53,6 +53,8 @@
 //! 14. [`reconstruction`]: field to pictures, and how good they are
 //! 16. [`display`]: monitors and the fullscreen window (feature `display`)
 
+#[cfg(feature = "display")]
+pub mod display;
 pub mod encode;
 pub mod error;
 pub mod field;
