@@ -2,7 +2,7 @@
 //!
 //! [`Display`] is the connection to the window system. [`Display::monitors`] lists what there is; [`MonitorChoice`]
 //! names one by connector, EDID, serial number or place. [`PanelWindow`] covers one monitor exactly and keeps it so;
-//! [`show`] does the whole for one frame.
+//! [`show`] does the whole for one frame, [`play`] for a sequence of them.
 //!
 //! # What is promised
 //!
@@ -18,15 +18,18 @@
 mod edid;
 mod frame;
 mod monitor;
+mod play;
 mod presenter;
 mod session;
 mod show;
+mod vblank;
 mod window;
 mod x11;
 
 pub use edid::{Edid, NativeMode};
 pub use frame::DisplayFrame;
 pub use monitor::{Gamma, Monitor, MonitorChoice, ScanOut};
+pub use play::{FrameTime, PlayReport, PlaySettings, play};
 pub use presenter::Presenter;
 pub use session::Display;
 pub use show::{OnAbsence, ShowEnd, ShowReport, ShowSettings, show};
