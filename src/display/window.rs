@@ -288,19 +288,21 @@ impl Open {
         settle(display, monitor, &window, x11.as_ref())?;
         let mut surface = Surface::new(settings.presenter, &window, monitor.width, monitor.height)?;
         surface.present(first)?;
-        if let Some((x11, id)) = &x11 {
-            x11.keep_above(*id)?;
-            if settings.take_keyboard {
-                x11.focus(*id)?;
-            }
-        }
         let background = x11.is_some();
         // A server without the Present extension only leaves frames unsynchronised.
         let blank = match &x11 {
             Some((_, id)) if surface.presenter() == Presenter::Software => VerticalBlank::of_window(*id).ok(),
             _ => None,
         };
-        Ok((Self { surface, window, inbox, x11, background, blank }, faults))
+        let open = Self { surface, window, inbox, x11, background, blank };
+        if let Some((x11, id)) = &open.x11 {
+            x11.keep_awake(true)?;
+            x11.keep_above(*id)?;
+            if settings.take_keyboard {
+                x11.focus(*id)?;
+            }
+        }
+        Ok((open, faults))
     }
 
     /// Where the window stands instead of on `monitor`, if so.
@@ -316,6 +318,15 @@ impl Open {
             self.background = false;
         }
         Ok(())
+    }
+}
+
+impl Drop for Open {
+    fn drop(&mut self) {
+        if let Some((x11, _)) = &self.x11 {
+            // A connection that is lost has taken the request with it.
+            let _ = x11.keep_awake(false);
+        }
     }
 }
 

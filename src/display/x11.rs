@@ -13,6 +13,7 @@ use x11rb::connection::{Connection, RequestConnection};
 use x11rb::errors::ReplyError;
 use x11rb::protocol::Event;
 use x11rb::protocol::randr::{self, ConnectionExt as _, Crtc, GetCrtcInfoReply, GetOutputInfoReply, ModeInfo, Output};
+use x11rb::protocol::screensaver::{self, ConnectionExt as _};
 use x11rb::protocol::xproto::{
     AtomEnum, ChangeWindowAttributesAux, ConfigureWindowAux, ConnectionExt as _, CreateGCAux, EventMask, ImageFormat,
     ImageOrder, InputFocus, MapState, StackMode, Window, WindowClass,
@@ -240,6 +241,18 @@ impl X11 {
         let focus = self.connection.set_input_focus(InputFocus::POINTER_ROOT, window, x11rb::CURRENT_TIME);
         there(focus.map_err(unanswered)?.check())?;
         Ok(())
+    }
+
+    /// Keeps screen saver and power saving from coming on, or lets them again; requests are counted, and forgotten when
+    /// the connection ends. A server without the extension has neither.
+    pub(super) fn keep_awake(&self, awake: bool) -> Result<()> {
+        let c = &self.connection;
+        if c.extension_information(screensaver::X11_EXTENSION_NAME).map_err(unanswered)?.is_none() {
+            return Ok(());
+        }
+        c.screensaver_query_version(1, 1).map_err(unanswered)?;
+        c.screensaver_suspend(awake.into()).map_err(unanswered)?.ignore_error();
+        c.flush().map_err(unanswered)
     }
 
     /// Raises `window` if another visible window covers a part of it. Tells whether one did.

@@ -4,9 +4,11 @@ use crate::frames::Picture;
 use std::time::{Duration, Instant};
 use x11rb::connection::Connection;
 use x11rb::protocol::randr::{self, ConnectionExt as _};
+use x11rb::protocol::screensaver::{self, ConnectionExt as _};
 use x11rb::protocol::xfixes::ConnectionExt as _;
 use x11rb::protocol::xproto::{
-    AtomEnum, ConnectionExt as _, CreateWindowAux, ImageFormat, PropMode, StackMode, WindowClass,
+    AtomEnum, Blanking, ConnectionExt as _, CreateWindowAux, Exposures, ImageFormat, PropMode, ScreenSaver, StackMode,
+    WindowClass,
 };
 use x11rb::rust_connection::RustConnection;
 
@@ -140,6 +142,19 @@ impl Desk {
             assert!(start.elapsed() < PATIENCE, "waited in vain: {what}");
             std::thread::sleep(Duration::from_millis(10));
         }
+    }
+
+    /// Lets the screen saver come after that many seconds without a key; 0: never.
+    pub(crate) fn set_screen_saver(&self, seconds: i16) {
+        let (blanking, exposures) = (Blanking::PREFERRED, Exposures::ALLOWED);
+        self.connection.set_screen_saver(seconds, 0, blanking, exposures).expect("saver").check().expect("saver");
+        self.connection.force_screen_saver(ScreenSaver::RESET).expect("saver").check().expect("saver");
+    }
+
+    /// Whether the screen is blanked.
+    pub(crate) fn screen_saver_is_on(&self) -> bool {
+        let info = self.connection.screensaver_query_info(self.root).expect("saver").reply().expect("saver");
+        info.state == u8::from(screensaver::State::ON)
     }
 
     pub(crate) fn warp_pointer(&self, x: i16, y: i16) {
