@@ -4,7 +4,7 @@
 use crate::desk::PATIENCE;
 use crate::frames::{Pattern, Picture};
 use holodrive::display::{
-    Display, OnAbsence, PanelWindow, PlaySettings, ShowSettings, Standing, WindowSettings, play, show,
+    Display, OnAbsence, PanelWindow, PlaySettings, ShowSettings, Standing, WindowSettings, examine, play, show,
 };
 use holodrive::progress::Progress;
 use serde::{Deserialize, Serialize};
@@ -22,6 +22,8 @@ const JOB: &str = "HOLODRIVE_DISPLAY_TEST_JOB";
 pub(crate) enum Job {
     /// List the monitors.
     Monitors,
+    /// Look at everything that spoils levels on that monitor.
+    Examine(String),
     /// Show one frame.
     Show(ShowJob),
     /// Open the window with the job's frame, then present each of these when the test says "next".
@@ -79,6 +81,7 @@ fn run(job: Job) -> holodrive::Result<serde_json::Value> {
     let mut display = Display::connect()?;
     match job {
         Job::Monitors => Ok(json(&display.monitors()?)),
+        Job::Examine(monitor) => Ok(json(&examine(&mut display, Some(&monitor.parse()?))?)),
         Job::Show(job) => {
             let settings = ShowSettings {
                 monitor: job.monitor.parse()?,
