@@ -4,6 +4,7 @@ use super::frame::DisplayFrame;
 use super::monitor::{Monitor, MonitorChoice};
 use super::presenter::{Presenter, Surface};
 use super::session::{Display, Inbox};
+use super::vblank::VerticalBlank;
 use super::x11::{Rectangle, X11};
 use crate::error::{Error, Result};
 use serde::Serialize;
@@ -89,6 +90,7 @@ struct Open {
     inbox: Rc<RefCell<Inbox>>,
     x11: Option<(Rc<X11>, u32)>,
     background: bool,
+    blank: Option<VerticalBlank>,
 }
 
 impl PanelWindow {
@@ -171,6 +173,15 @@ impl PanelWindow {
         self.last = Arc::clone(frame);
         self.frames += 1;
         Ok(Presented { number: self.frames - 1, at: Instant::now(), taken })
+    }
+
+    /// Waits for the monitor's next vertical blank, if frames are not made to wait for it by the graphics card and the
+    /// X server tells of it. Returns the server's count of them.
+    pub(super) fn wait_for_vertical_blank(&mut self, limit: Duration) -> Result<Option<u64>> {
+        match self.open.as_mut().and_then(|open| open.blank.as_mut()) {
+            Some(blank) => blank.next(limit),
+            None => Ok(None),
+        }
     }
 
     /// Deals with what has happened to the window since the last call; call it after each [`Display::turn`].
@@ -277,14 +288,21 @@ impl Open {
         settle(display, monitor, &window, x11.as_ref())?;
         let mut surface = Surface::new(settings.presenter, &window, monitor.width, monitor.height)?;
         surface.present(first)?;
-        if let Some((x11, id)) = &x11 {
+        let background = x11.is_some();
+        // A server without the Present extension only leaves frames unsynchronised.
+        let blank = match &x11 {
+            Some((_, id)) if surface.presenter() == Presenter::Software => VerticalBlank::of_window(*id).ok(),
+            _ => None,
+        };
+        let open = Self { surface, window, inbox, x11, background, blank };
+        if let Some((x11, id)) = &open.x11 {
+            x11.keep_awake(true)?;
             x11.keep_above(*id)?;
             if settings.take_keyboard {
                 x11.focus(*id)?;
             }
         }
-        let background = x11.is_some();
-        Ok((Self { surface, window, inbox, x11, background }, faults))
+        Ok((open, faults))
     }
 
     /// Where the window stands instead of on `monitor`, if so.
@@ -300,6 +318,15 @@ impl Open {
             self.background = false;
         }
         Ok(())
+    }
+}
+
+impl Drop for Open {
+    fn drop(&mut self) {
+        if let Some((x11, _)) = &self.x11 {
+            // A connection that is lost has taken the request with it.
+            let _ = x11.keep_awake(false);
+        }
     }
 }
 

@@ -4,6 +4,7 @@
 //! events, but Xlib drops those of extensions that nobody registered with it), and know neither EDID nor gamma, so
 //! this second connection does.
 
+use super::doctor::{Property, Screen};
 use super::edid::Edid;
 use super::frame::DisplayFrame;
 use super::monitor::{Gamma, Monitor, ScanOut};
@@ -13,6 +14,7 @@ use x11rb::connection::{Connection, RequestConnection};
 use x11rb::errors::ReplyError;
 use x11rb::protocol::Event;
 use x11rb::protocol::randr::{self, ConnectionExt as _, Crtc, GetCrtcInfoReply, GetOutputInfoReply, ModeInfo, Output};
+use x11rb::protocol::screensaver::{self, ConnectionExt as _};
 use x11rb::protocol::xproto::{
     AtomEnum, ChangeWindowAttributesAux, ConfigureWindowAux, ConnectionExt as _, CreateGCAux, EventMask, ImageFormat,
     ImageOrder, InputFocus, MapState, StackMode, Window, WindowClass,
@@ -28,6 +30,8 @@ const EDID_LIMIT: u32 = 8 * 128 / 4;
 pub(super) struct X11 {
     connection: RustConnection,
     root: Window,
+    /// The screen's number on its server.
+    number: usize,
     edid_property: u32,
 }
 
@@ -95,7 +99,7 @@ impl X11 {
         connection.change_window_attributes(root, &children).map_err(unanswered)?;
         let edid_property =
             connection.intern_atom(false, b"EDID").map_err(unanswered)?.reply().map_err(unanswered)?.atom;
-        Ok(Self { connection, root, edid_property })
+        Ok(Self { connection, root, number: screen, edid_property })
     }
 
     /// The monitors that show a part of the desktop, in the server's order.
@@ -172,6 +176,57 @@ impl X11 {
         Ok(there(reply)?.map_or(Gamma::Unknown, |table| Gamma::of_table(&table.red, &table.green, &table.blue)))
     }
 
+    /// What the server tells of the desktop as a whole.
+    pub(super) fn screen(&self) -> Result<Screen> {
+        let c = &self.connection;
+        let depth = c.get_geometry(self.root).map_err(unanswered)?.reply().map_err(unanswered)?.depth;
+        // A compositing manager owns this selection (ICCCM 2.8 and EWMH).
+        let selection = format!("_NET_WM_CM_S{}", self.number);
+        let atom = c.intern_atom(false, selection.as_bytes()).map_err(unanswered)?.reply().map_err(unanswered)?.atom;
+        let owner = c.get_selection_owner(atom).map_err(unanswered)?.reply().map_err(unanswered)?.owner;
+        Ok(Screen { depth, composited: owner != x11rb::NONE })
+    }
+
+    /// The driver's settings of an output: names and words as they are, numbers in decimal with commas.
+    pub(super) fn properties(&self, name: &str) -> Result<Vec<Property>> {
+        let c = &self.connection;
+        let resources =
+            c.randr_get_screen_resources_current(self.root).map_err(unanswered)?.reply().map_err(unanswered)?;
+        let mut properties = Vec::new();
+        for &output in &resources.outputs {
+            let info = there(c.randr_get_output_info(output, 0).map_err(unanswered)?.reply())?;
+            if info.is_none_or(|info| info.name != name.as_bytes()) {
+                continue;
+            }
+            let Some(list) = there(c.randr_list_output_properties(output).map_err(unanswered)?.reply())? else {
+                continue;
+            };
+            for atom in list.atoms.into_iter().filter(|&atom| atom != self.edid_property) {
+                let request = c.randr_get_output_property(output, atom, AtomEnum::ANY, 0, 64, false, false);
+                let (Some(name), Some(value)) = (self.atom_name(atom)?, there(request.map_err(unanswered)?.reply())?)
+                else {
+                    continue;
+                };
+                let words: Vec<String> = match (value.format, value.type_) {
+                    (32, kind) if kind == u32::from(AtomEnum::ATOM) => words_of(&value.data)
+                        .map(|atom| self.atom_name(atom))
+                        .filter_map(Result::transpose)
+                        .collect::<Result<_>>()?,
+                    (32, _) => words_of(&value.data).map(|word| word.to_string()).collect(),
+                    (8, _) => value.data.iter().map(ToString::to_string).collect(),
+                    _ => continue,
+                };
+                properties.push(Property { name, value: words.join(",") });
+            }
+        }
+        Ok(properties)
+    }
+
+    fn atom_name(&self, atom: u32) -> Result<Option<String>> {
+        let name = there(self.connection.get_atom_name(atom).map_err(unanswered)?.reply())?;
+        Ok(name.map(|name| String::from_utf8_lossy(&name.name).into_owned()))
+    }
+
     /// Makes `frame` the background of `window`, so that the server itself paints it in the instant in which the
     /// window appears: no moment of white, or of what was there before.
     ///
@@ -242,6 +297,18 @@ impl X11 {
         Ok(())
     }
 
+    /// Keeps screen saver and power saving from coming on, or lets them again; requests are counted, and forgotten when
+    /// the connection ends. A server without the extension has neither.
+    pub(super) fn keep_awake(&self, awake: bool) -> Result<()> {
+        let c = &self.connection;
+        if c.extension_information(screensaver::X11_EXTENSION_NAME).map_err(unanswered)?.is_none() {
+            return Ok(());
+        }
+        c.screensaver_query_version(1, 1).map_err(unanswered)?;
+        c.screensaver_suspend(awake.into()).map_err(unanswered)?.ignore_error();
+        c.flush().map_err(unanswered)
+    }
+
     /// Raises `window` if another visible window covers a part of it. Tells whether one did.
     pub(super) fn keep_above(&self, window: Window) -> Result<bool> {
         let c = &self.connection;
@@ -293,6 +360,11 @@ fn refresh(mode: &ModeInfo) -> Option<f64> {
     let fields = if flags.contains(randr::ModeFlag::INTERLACE) { 2.0 } else { 1.0 };
     let scans = if flags.contains(randr::ModeFlag::DOUBLE_SCAN) { 2.0 } else { 1.0 };
     (pixels > 0.0 && mode.dot_clock > 0).then(|| f64::from(mode.dot_clock) * fields / (pixels * scans))
+}
+
+/// The 32-bit words of a property; x11rb has put them into this machine's byte order.
+fn words_of(bytes: &[u8]) -> impl Iterator<Item = u32> {
+    bytes.chunks_exact(4).map(|word| u32::from_ne_bytes([word[0], word[1], word[2], word[3]]))
 }
 
 fn unanswered(error: impl fmt::Display) -> Error {

@@ -3,7 +3,9 @@
 
 use crate::desk::PATIENCE;
 use crate::frames::{Pattern, Picture};
-use holodrive::display::{Display, OnAbsence, PanelWindow, ShowSettings, Standing, WindowSettings, show};
+use holodrive::display::{
+    Display, OnAbsence, PanelWindow, PlaySettings, ShowSettings, Standing, WindowSettings, examine, play, show,
+};
 use holodrive::progress::Progress;
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
@@ -20,10 +22,16 @@ const JOB: &str = "HOLODRIVE_DISPLAY_TEST_JOB";
 pub(crate) enum Job {
     /// List the monitors.
     Monitors,
+    /// Look at everything that spoils levels on that monitor.
+    Examine(String),
     /// Show one frame.
     Show(ShowJob),
     /// Open the window with the job's frame, then present each of these when the test says "next".
     Frames(ShowJob, Vec<Pattern>),
+    /// Play that many numbered frames at that rate.
+    Play(ShowJob, u64, Option<f64>),
+    /// Show two frames on two monitors at once.
+    Two(ShowJob, ShowJob),
 }
 
 /// One frame on one monitor.
@@ -73,6 +81,7 @@ fn run(job: Job) -> holodrive::Result<serde_json::Value> {
     let mut display = Display::connect()?;
     match job {
         Job::Monitors => Ok(json(&display.monitors()?)),
+        Job::Examine(monitor) => Ok(json(&examine(&mut display, Some(&monitor.parse()?))?)),
         Job::Show(job) => {
             let settings = ShowSettings {
                 monitor: job.monitor.parse()?,
@@ -81,6 +90,35 @@ fn run(job: Job) -> holodrive::Result<serde_json::Value> {
                 on_absence: if job.wait { OnAbsence::Wait } else { OnAbsence::End },
             };
             Ok(json(&show(&mut display, job.picture().frame(), &settings, &stopped_by_input())?))
+        }
+        Job::Play(job, count, rate) => {
+            let settings = PlaySettings {
+                monitor: job.monitor.parse()?,
+                window: job.window()?,
+                rate,
+                hold: job.hold.map(Duration::from_secs_f64),
+                ahead: 4,
+                on_absence: OnAbsence::End,
+            };
+            let frames = (0..count).map(|number| Ok(Picture::numbered(number, job.width, job.height).frame()));
+            let mut times = Vec::new();
+            let report = play(&mut display, frames, &settings, &mut |t| times.push(*t), &stopped_by_input())?;
+            Ok(serde_json::json!({ "report": report, "times": times }))
+        }
+        Job::Two(one, other) => {
+            let progress = stopped_by_input();
+            let mut open = |job: &ShowJob| {
+                let frame = Arc::new(job.picture().frame());
+                PanelWindow::open(&mut display, &job.monitor.parse()?, &frame, &job.window()?)
+            };
+            let mut panels = [open(&one)?, open(&other)?];
+            while !progress.stopped() {
+                display.turn(Duration::from_millis(5))?;
+                for panel in &mut panels {
+                    panel.attend(&mut display)?;
+                }
+            }
+            Ok(json(&panels.map(|panel| panel.monitor().name.clone())))
         }
         Job::Frames(job, patterns) => {
             let first = Arc::new(job.picture().frame());
@@ -152,6 +190,11 @@ impl Running {
     /// Tells it to present the next frame.
     pub(crate) fn next(&mut self) {
         writeln!(self.process.stdin.as_ref().expect("input"), "next").expect("the child listens");
+    }
+
+    /// Whether it has ended with an error.
+    pub(crate) fn refused(&mut self) -> bool {
+        self.process.try_wait().expect("child process").is_some_and(|status| !status.success())
     }
 
     /// Asks it to stop, and returns what it reports.

@@ -4,9 +4,11 @@ use crate::frames::Picture;
 use std::time::{Duration, Instant};
 use x11rb::connection::Connection;
 use x11rb::protocol::randr::{self, ConnectionExt as _};
+use x11rb::protocol::screensaver::{self, ConnectionExt as _};
 use x11rb::protocol::xfixes::ConnectionExt as _;
 use x11rb::protocol::xproto::{
-    AtomEnum, ConnectionExt as _, CreateWindowAux, ImageFormat, PropMode, StackMode, WindowClass,
+    AtomEnum, Blanking, ConnectionExt as _, CreateWindowAux, Exposures, ImageFormat, PropMode, ScreenSaver, StackMode,
+    WindowClass,
 };
 use x11rb::rust_connection::RustConnection;
 
@@ -81,18 +83,32 @@ impl Desk {
 
     /// Gives the monitor an EDID, or takes it away.
     pub(crate) fn set_edid(&self, plug: &Plug, edid: Option<&[u8]>) {
-        let c = &self.connection;
-        let property = c.intern_atom(false, b"EDID").expect("atom").reply().expect("atom").atom;
-        if let Some(bytes) = edid {
-            let kind = AtomEnum::INTEGER.into();
-            let count = bytes.len() as u32;
-            c.randr_change_output_property(plug.output, property, kind, 8, PropMode::REPLACE, count, bytes)
-                .expect("RandR")
-                .check()
-                .expect("EDID property");
-        } else {
-            c.randr_delete_output_property(plug.output, property).expect("RandR").check().expect("EDID property");
+        match edid {
+            Some(bytes) => self.set_output_property(plug, "EDID", AtomEnum::INTEGER, 8, bytes.len(), bytes),
+            None => self.remove_output_property(plug, "EDID"),
         }
+    }
+
+    /// Gives the monitor a setting whose value is a word, as graphics drivers do.
+    pub(crate) fn set_output_word(&self, plug: &Plug, property: &str, word: &str) {
+        self.set_output_property(plug, property, AtomEnum::ATOM, 32, 1, &self.atom(word).to_ne_bytes());
+    }
+
+    pub(crate) fn remove_output_property(&self, plug: &Plug, property: &str) {
+        let deleted = self.connection.randr_delete_output_property(plug.output, self.atom(property));
+        deleted.expect("RandR").check().expect("output property");
+    }
+
+    fn set_output_property(&self, plug: &Plug, name: &str, kind: AtomEnum, format: u8, count: usize, bytes: &[u8]) {
+        let (c, mode, property) = (&self.connection, PropMode::REPLACE, self.atom(name));
+        c.randr_change_output_property(plug.output, property, kind.into(), format, mode, count as u32, bytes)
+            .expect("RandR")
+            .check()
+            .expect("output property");
+    }
+
+    fn atom(&self, name: &str) -> u32 {
+        self.connection.intern_atom(false, name.as_bytes()).expect("atom").reply().expect("atom").atom
     }
 
     /// Fills the monitor's gamma table with `level -> value`, and returns what was there.
@@ -142,6 +158,19 @@ impl Desk {
         }
     }
 
+    /// Lets the screen saver come after that many seconds without a key; 0: never.
+    pub(crate) fn set_screen_saver(&self, seconds: i16) {
+        let (blanking, exposures) = (Blanking::PREFERRED, Exposures::ALLOWED);
+        self.connection.set_screen_saver(seconds, 0, blanking, exposures).expect("saver").check().expect("saver");
+        self.connection.force_screen_saver(ScreenSaver::RESET).expect("saver").check().expect("saver");
+    }
+
+    /// Whether the screen is blanked.
+    pub(crate) fn screen_saver_is_on(&self) -> bool {
+        let info = self.connection.screensaver_query_info(self.root).expect("saver").reply().expect("saver");
+        info.state == u8::from(screensaver::State::ON)
+    }
+
     pub(crate) fn warp_pointer(&self, x: i16, y: i16) {
         self.connection.warp_pointer(x11rb::NONE, self.root, 0, 0, 0, 0, x, y).expect("WarpPointer");
         self.connection.flush().expect("flush");
@@ -156,7 +185,7 @@ impl Desk {
     /// Whether a window manager says that it is at work.
     pub(crate) fn window_manager_is_there(&self) -> bool {
         let c = &self.connection;
-        let name = c.intern_atom(false, b"_NET_SUPPORTING_WM_CHECK").expect("atom").reply().expect("atom").atom;
+        let name = self.atom("_NET_SUPPORTING_WM_CHECK");
         let check = c.get_property(false, self.root, name, AtomEnum::WINDOW, 0, 1).expect("property");
         let window = check.reply().expect("property").value32().and_then(|mut values| values.next());
         window.is_some_and(|window| c.get_geometry(window).expect("geometry").reply().is_ok())

@@ -3,6 +3,9 @@
 use holodrive::display::DisplayFrame;
 use holodrive::random::Random;
 
+/// Pixels that carry a frame's number.
+pub(crate) const NUMBER_BITS: u32 = 16;
+
 /// Pixels as they are on a screen.
 #[derive(Clone, PartialEq, Eq)]
 pub(crate) struct Picture {
@@ -42,6 +45,28 @@ impl Picture {
             }
         }
         Self { width, height, pixels }
+    }
+
+    /// A frame that carries its number in its first 16 pixels, black and white, in every row.
+    pub(crate) fn numbered(number: u64, width: u32, height: u32) -> Self {
+        let row: Vec<[u8; 3]> =
+            (0..width)
+                .map(|x| {
+                    if x < NUMBER_BITS { [if number >> x & 1 == 1 { 255 } else { 0 }; 3] } else { [(x & 255) as u8; 3] }
+                })
+                .collect();
+        Self { width, height, pixels: row.repeat(height as usize) }
+    }
+
+    /// The number that a captured row carries; none where it is not black and white.
+    pub(crate) fn number(&self) -> Option<u64> {
+        let bit = |pixel: &[u8; 3]| match pixel {
+            [0, 0, 0] => Some(0),
+            [255, 255, 255] => Some(1),
+            _ => None,
+        };
+        let bits = self.pixels.iter().take(NUMBER_BITS as usize);
+        bits.enumerate().try_fold(0, |number, (x, pixel)| Some(number | bit(pixel)? << x))
     }
 
     pub(crate) fn frame(&self) -> DisplayFrame {

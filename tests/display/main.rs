@@ -13,6 +13,7 @@ mod monitors;
 mod ownership;
 mod pixels;
 mod server;
+mod timing;
 mod window_manager;
 
 use desk::Desk;
@@ -35,7 +36,8 @@ fn main() -> ExitCode {
         return code;
     }
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let cases: Vec<Case> = [monitors::CASES, pixels::CASES, ownership::CASES, window_manager::CASES].concat();
+    let cases: Vec<Case> =
+        [monitors::CASES, pixels::CASES, ownership::CASES, timing::CASES, window_manager::CASES].concat();
     if arguments.iter().any(|argument| argument == "--list") {
         cases.iter().for_each(|(name, _)| println!("{name}: test"));
         return ExitCode::SUCCESS;

@@ -5,6 +5,7 @@ use crate::desk::Desk;
 use crate::frames::Pattern;
 use crate::server::{ODD_PANEL, OPERATOR, PANEL};
 use crate::{Case, Ended};
+use std::collections::BTreeMap;
 
 pub(crate) const CASES: &[Case] = &[
     ("monitors_are_listed_as_the_server_has_them", listed),
@@ -12,6 +13,7 @@ pub(crate) const CASES: &[Case] = &[
     ("an_unknown_monitor_is_refused_with_a_list", unknown),
     ("a_frame_of_another_size_is_refused", other_size),
     ("a_gamma_table_that_changes_levels_is_refused", gamma),
+    ("the_doctor_finds_what_alters_levels", doctor),
     ("without_a_display_server_there_is_one_clear_error", no_server),
 ];
 
@@ -129,5 +131,33 @@ fn no_server(_: &Desk) -> Ended {
     for message in [nowhere, wrong] {
         assert!(message.contains("no display server") && !message.contains('\n'), "{message}");
     }
+    Ended::Passed
+}
+
+fn doctor(desk: &Desk) -> Ended {
+    let findings = || {
+        let job = Job::Examine(PANEL.into());
+        let report = Running::start(Some(desk.display()), &job, &[]).end().expect("findings");
+        let severity = |finding: &serde_json::Value| finding["severity"].as_str().map(str::to_owned);
+        let list = report.as_array().expect("list").iter();
+        list.map(|f| (f["subject"].as_str().expect("subject").to_owned(), severity(f).expect("severity"))).collect()
+    };
+    let plug = desk.plug(PANEL);
+    let clean: BTreeMap<String, String> = findings();
+    let swapped: Vec<u16> = (0..256).map(|i: u16| (i ^ 1) << 8).collect();
+    let identity = desk.set_gamma(&plug, &swapped);
+    desk.set_output_word(&plug, "Broadcast RGB", "Limited 16:235");
+    let spoilt: BTreeMap<String, String> = findings();
+    desk.set_gamma(&plug, &identity);
+    desk.remove_output_property(&plug, "Broadcast RGB");
+    for (subject, before) in &clean {
+        let expected = match subject.as_str() {
+            "gamma" | "range" => "fault",
+            _ => before.as_str(),
+        };
+        assert_eq!(spoilt[subject], expected, "{subject}");
+        assert_eq!(before, if subject == "range" { "unknown" } else { "good" }, "{subject}");
+    }
+    assert!(clean.len() >= 9, "{clean:?}");
     Ended::Passed
 }

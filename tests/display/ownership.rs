@@ -13,6 +13,7 @@ pub(crate) const CASES: &[Case] = &[
     ("a_window_raised_above_the_panel_does_not_stay_there", raised),
     ("unplugging_ends_the_show_and_touches_no_other_monitor", unplugged),
     ("unplugging_is_waited_out_where_asked", replugged),
+    ("no_screen_saver_comes_while_a_frame_is_shown", awake),
     ("escape_in_the_window_ends_the_show", escape),
 ];
 
@@ -100,5 +101,18 @@ pub(crate) fn escape(desk: &Desk) -> Ended {
     let pressed = Command::new("xdotool").args(["key", "Escape"]).env("DISPLAY", desk.display()).status();
     assert!(pressed.is_ok_and(|status| status.success()));
     assert_eq!(running.end().expect("report")["end"], "closed");
+    Ended::Passed
+}
+
+fn awake(desk: &Desk) -> Ended {
+    let running = start(desk, &job());
+    std::thread::sleep(Duration::from_millis(500));
+    desk.set_screen_saver(1);
+    std::thread::sleep(Duration::from_secs(3));
+    let with_panel = desk.screen_saver_is_on();
+    running.stop().expect("report");
+    desk.wait_until("the screen saver comes without the panel", || desk.screen_saver_is_on());
+    desk.set_screen_saver(0);
+    assert!(!with_panel);
     Ended::Passed
 }
