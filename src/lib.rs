@@ -60,6 +60,7 @@ pub mod error;
 pub mod field;
 pub mod files;
 pub mod hologram;
+pub mod illumination;
 pub mod panel;
 pub mod points;
 pub mod progress;
