@@ -51,6 +51,7 @@
 //! 12. [`panel`]: profiles, frames of drive levels, packing, the simulated panel
 //! 13. [`encode`]: field to phase or fringes for a panel's levels and range
 //! 14. [`reconstruction`]: field to pictures, and how good they are
+//! 15. [`pipeline`]: the whole way, on one screen
 //! 16. [`display`]: monitors and the fullscreen window (feature `display`)
 
 #[cfg(feature = "display")]
@@ -62,6 +63,7 @@ pub mod files;
 pub mod hologram;
 pub mod illumination;
 pub mod panel;
+pub mod pipeline;
 pub mod points;
 pub mod progress;
 pub mod propagation;

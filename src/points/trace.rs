@@ -51,6 +51,8 @@ pub struct TracedPoint {
     pub pixel: u32,
     /// How many mirrors or glass surfaces lie between.
     pub bounces: u8,
+    /// Instance of the first surface that the ray meets.
+    pub instance: u32,
 }
 
 /// What tracing gave.
@@ -156,6 +158,7 @@ pub fn trace(light: &Illumination, camera: &Camera, settings: &TraceSettings, pr
                 distance: seen.path,
                 pixel: pixel as u32,
                 bounces: seen.bounces,
+                instance: light.bvh().scene().triangles[seen.first as usize].instance,
             }
         })
         .collect();
