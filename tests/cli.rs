@@ -153,7 +153,7 @@ fn bad_profiles_and_flags_end_in_one_line() {
     }
     refused(f, &["compute", "p.ply", "--panel", "no-such-panel"], "no-such-panel");
     refused(f, &["compute", "p.ply", "--wavelength", "633"], "unit");
-    refused(f, &["compute", "p.ply", "--wavelength", "-633nm"], "greater than zero");
+    refused(f, &["compute", "p.ply", "--wavelength=-633nm"], "greater than zero");
     refused(f, &["compute", "p.ply", "--error", "nan"], "error");
     refused(f, &["points", &scene("cornell.gltf"), "--rays", "0x500"], "500x500");
     refused(f, &["points", &scene("cornell.gltf"), "--camera", "nobody"], "nobody");

@@ -112,8 +112,9 @@ fn up_is_up_and_left_is_left_from_point_to_picture_for_every_encoding_and_both_s
             assert!(column.abs_diff(25) <= 1 && (16..=18).contains(&row), "{name}, z {z}: {column}, {row}");
             let at =
                 |c: usize| (16..=18).map(|r| (c - 1..=c).map(|c| seen.values[r * 80 + c]).sum::<f32>()).sum::<f32>();
-            // Mirrored left to right about the first point it would stand at column 5, about the axis at column 35.
-            assert!(at(45) > 3.0 * at(5) && at(45) > 3.0 * at(35), "{name}, z {z}: {} {} {}", at(45), at(5), at(35));
+            // Mirrored left to right about the first point it would stand at column 5, about the axis at column 35. A
+            // kinoform really has a ghost at column 5, weaker by half: the beat of the two points.
+            assert!(at(45) > 1.5 * at(5) && at(45) > 3.0 * at(35), "{name}, z {z}: {} {} {}", at(45), at(5), at(35));
         }
     }
 }

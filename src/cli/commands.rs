@@ -131,21 +131,21 @@ pub(super) fn input(path: &Path) -> Result<Input> {
     {
         return Ok(Input::Images(rgb.into(), depth.into()));
     }
-    if !path.is_file() {
-        let missing = std::io::Error::from(std::io::ErrorKind::NotFound);
-        return Err(Error::Io { path: path.into(), source: missing });
-    }
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    match extension.as_str() {
-        "gltf" | "glb" => Ok(Input::Scene(path.into())),
-        "ply" => Ok(Input::Points(path.into())),
-        "npy" => Ok(Input::Field(path.into())),
-        "png" | "bmp" => Ok(Input::Frame(path.into())),
-        _ => Err(Error::input(
-            path,
-            "not a kind of file that is read here: .gltf, .glb, .ply, .npy, .png, .bmp, or rgb.png+depth.png",
-        )),
-    }
+    let found = match extension.as_str() {
+        "gltf" | "glb" => Input::Scene(path.into()),
+        "ply" => Input::Points(path.into()),
+        "npy" => Input::Field(path.into()),
+        "png" | "bmp" => Input::Frame(path.into()),
+        _ => {
+            let what =
+                "not a kind of file that is read here: .gltf, .glb, .ply, .npy, .png, .bmp, or rgb.png+depth.png";
+            return Err(Error::input(path, what));
+        }
+    };
+    // Found out before an output folder is made.
+    std::fs::File::open(path).map_err(Error::io(path))?;
+    Ok(found)
 }
 
 /// Points with what is known of them.
