@@ -28,6 +28,8 @@ pub(crate) struct Division {
     pub(crate) error: f64,
     /// Memory beside the field [bytes].
     pub(crate) bytes: u64,
+    /// Predicted work on AVX-512 [core-seconds].
+    pub(crate) core_seconds: f64,
 }
 
 impl Division {
@@ -50,7 +52,9 @@ impl Division {
         let shape = far.iter().map(|class| class.shape.error).fold(0.0, f64::max);
         let bytes =
             near::bytes(optics, sources, &near) + far.iter().map(|class| class.bytes(optics, cull)).max().unwrap_or(0);
-        Self { near, far, error: form + shape + ROUNDING, bytes }
+        let core_seconds = near::core_seconds(optics, sources, &near)
+            + far.iter().map(|class| class.core_seconds(optics, grid, sources, cull)).sum::<f64>();
+        Self { near, far, error: form + shape + ROUNDING, bytes, core_seconds }
     }
 
     /// Work in the unit that [`Progress`] counts: points of near sources, points × tiles of far ones.

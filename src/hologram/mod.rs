@@ -9,19 +9,23 @@ mod exact;
 mod lanes;
 mod near;
 mod oracle;
+mod planes;
+mod planner;
 mod sources;
 mod tiles;
 
 pub use lanes::InstructionSet;
 pub use oracle::{oracle, oracle_at};
+pub use planner::plan;
 pub use sources::Coverage;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::field::{Field, Grid};
 use crate::points::PointSource;
 use crate::progress::Progress;
 use definition::Optics;
-use exact::{DIRECT_ERROR, Division};
+use exact::Division;
+use planner::{Engine, ORACLE_ERROR};
 use sources::{Source, sources};
 use std::time::Instant;
 
@@ -34,6 +38,8 @@ pub enum Method {
     Direct,
     /// Vectorised sum as matrix products over tiles as large as the wanted error allows.
     Tiles,
+    /// Spectral wavefront recording planes; [`Cull::Soft`] only.
+    Planes,
 }
 
 impl Method {
@@ -43,6 +49,7 @@ impl Method {
             Self::Oracle => "oracle",
             Self::Direct => "direct",
             Self::Tiles => "tiles",
+            Self::Planes => "planes",
         }
     }
 }
@@ -98,6 +105,7 @@ pub struct Plan {
     pub instruction_set: InstructionSet,
     /// Settings that the plan answers.
     pub settings: HologramSettings,
+    engine: Engine,
 }
 
 /// What was done.
@@ -130,46 +138,6 @@ pub struct Computed {
     pub report: HologramReport,
 }
 
-/// Chooses engine and parameters for these points on this grid.
-///
-/// Refused: points that are not finite, settings out of their domain, a job that does not fit its memory.
-pub fn plan(points: &[PointSource], grid: &Grid, wavelength: f64, settings: &HologramSettings) -> Result<Plan> {
-    let optics = Optics::new(grid, wavelength)?;
-    let error = settings.error;
-    if !(1e-5..1.0).contains(&error) {
-        return Err(Error::parameter("error", format!("{error:e} must lie between 1e-5 and 1")));
-    }
-    let set = settings.instruction_set.unwrap_or_else(InstructionSet::detect);
-    if !InstructionSet::available().contains(&set) {
-        return Err(Error::unsupported(format!("this machine has no {}", set.name())));
-    }
-    let sources = sources(points)?;
-    let coverage = Coverage::of(points.len(), &sources, grid, &optics, settings.cull);
-    let (method, reason) = match settings.method {
-        Some(method) => (method, "asked for".to_owned()),
-        None if error < DIRECT_ERROR => (Method::Direct, format!("an error of {error:.0e} was asked")),
-        None => (Method::Tiles, format!("tiles as large as an error of {error:.0e} allows")),
-    };
-    let division = |error| Division::new(&optics, grid, &sources, settings.cull, error);
-    let (memory, predicted, rate) = match method {
-        Method::Oracle => (24 * points.len() as u64 + 8 * grid.len() as u64, 1e-5, 2e7),
-        Method::Direct => {
-            let division = division(DIRECT_ERROR);
-            (division.bytes, division.error, 5e9)
-        }
-        Method::Tiles => {
-            let division = division(error);
-            (division.bytes, division.error, 1e10)
-        }
-    };
-    if memory > settings.memory {
-        let hint = "give more memory, or a smaller grid".to_owned();
-        return Err(Error::Memory { what: method.name(), needed: memory >> 20, budget: settings.memory >> 20, hint });
-    }
-    let seconds = coverage.pairs / (rate * rayon::current_num_threads() as f64);
-    Ok(Plan { method, reason, seconds, error: predicted, memory, instruction_set: set, settings: *settings })
-}
-
 /// Computes the field as planned; the plan may come from another cloud of the same kind (its choices are kept).
 pub fn compute(
     points: &[PointSource],
@@ -184,14 +152,18 @@ pub fn compute(
     let sources = sources(points)?;
     let coverage = Coverage::of(points.len(), &sources, grid, &optics, cull);
     let set = plan.instruction_set;
-    let sum = |error: f64| -> Result<(Field, f64)> {
-        let division = Division::new(&optics, grid, &sources, cull, error);
-        Ok((division.sum(grid, &optics, &sources, cull, set, progress)?, division.error))
-    };
-    let (field, error_bound) = match plan.method {
-        Method::Oracle => (oracle(points, grid, wavelength, cull)?.to_f32(), 1e-5),
-        Method::Direct => sum(DIRECT_ERROR)?,
-        Method::Tiles => sum(plan.settings.error)?,
+    let (field, error_bound) = match plan.engine {
+        Engine::Oracle => (oracle(points, grid, wavelength, cull)?.to_f32(), ORACLE_ERROR),
+        Engine::Exact { error } => {
+            let division = Division::new(&optics, grid, &sources, cull, error);
+            (division.sum(grid, &optics, &sources, cull, set, progress)?, division.error)
+        }
+        Engine::Planes(parameters) => {
+            let met = planes::met(&optics, grid, &sources);
+            let mut field = Field::zeros(*grid, wavelength);
+            planes::add(&mut field, &optics, &met, &parameters, set, progress)?;
+            (field, parameters.error(&optics, &met, planes::steepness(&optics, grid, &met)))
+        }
     };
     let report = HologramReport {
         method: plan.method,

@@ -28,6 +28,25 @@ impl Source {
     pub(crate) fn span(&self, grid: &Grid) -> [[f64; 2]; 2] {
         [[grid.x(0) - self.x, grid.x(grid.width - 1) - self.x], [grid.y(grid.height - 1) - self.y, grid.y(0) - self.y]]
     }
+
+    /// Sines of the smallest and largest angle to a pixel along each axis, no further than ±`limit`.
+    pub(crate) fn sines(&self, grid: &Grid, limit: [f64; 2]) -> [[f64; 2]; 2] {
+        let spans = self.span(grid);
+        [0, 1].map(|axis| {
+            spans[axis].map(|d| {
+                let r = d.hypot(self.distance);
+                if r > 0.0 { (d / r).clamp(-limit[axis], limit[axis]) } else { 0.0 }
+            })
+        })
+    }
+}
+
+/// Root mean square of sin θ_x·sin θ_y over the pixels that the sources light: what errors of separable forms go with.
+pub(crate) fn tilt<'a>(sources: impl ExactSizeIterator<Item = &'a Source>, grid: &Grid, limit: [f64; 2]) -> f64 {
+    let count = sources.len().max(1) as f64;
+    let square = |[low, high]: [f64; 2]| (low * low + low * high + high * high) / 3.0;
+    let sum: f64 = sources.map(|s| s.sines(grid, limit).map(square).iter().product::<f64>()).sum();
+    (sum / count).sqrt()
 }
 
 /// Checks points and leaves out those of amplitude zero; refuses what is not finite, naming the point.

@@ -1,6 +1,7 @@
 //! Engines against the oracle, as complex fields.
 
 use super::*;
+use crate::error::Error;
 use crate::field::relative_error;
 use crate::random::Random;
 use glam::DVec3;
@@ -21,7 +22,8 @@ fn cloud(n: usize, center: [f64; 2], extent: [f64; 2], z: [f64; 2], smooth: bool
 }
 
 fn settings(method: Method, error: f64, set: InstructionSet) -> HologramSettings {
-    HologramSettings { error, method: Some(method), instruction_set: Some(set), ..HologramSettings::default() }
+    let memory = 4 << 30;
+    HologramSettings { error, method: Some(method), memory, instruction_set: Some(set), ..HologramSettings::default() }
 }
 
 fn field(points: &[PointSource], grid: &Grid, settings: &HologramSettings) -> Computed {
@@ -79,6 +81,27 @@ fn tiles_keep_the_error_that_they_state() {
 }
 
 #[test]
+fn planes_keep_the_error_that_they_state() {
+    let grid = panel();
+    for smooth in [false, true] {
+        for (name, points) in clouds(smooth) {
+            let exact = oracle(&points, &grid, WAVELENGTH, Cull::Soft).expect("oracle");
+            for (error, set) in [(5e-3, 0), (1e-3, 0), (4e-4, 0), (1e-3, 1), (1e-3, 2)] {
+                let Some(&set) = InstructionSet::available().get(set) else { continue };
+                let got = field(&points, &grid, &settings(Method::Planes, error, set));
+                let found = relative_error(&got.field.samples, &exact.samples);
+                println!(
+                    "planes {name} smooth={smooth} {error:.0e} {}: {found:.2e}, bound {:.2e}",
+                    set.name(),
+                    got.report.error_bound
+                );
+                assert!(found < error, "{name} {error:.0e} {}: {found:.2e}", set.name());
+            }
+        }
+    }
+}
+
+#[test]
 fn wide_angles_are_exact() {
     let grid = Grid::new(161, 95, 1e-6, 1.25e-6).expect("grid").centered_at([1e-3, 0.4e-3]);
     let points = cloud(40, [0.2e-3, 0.0], [3e-3, 3e-3], [-5e-3, -10e-3], false);
@@ -117,7 +140,7 @@ fn any_number_of_threads_gives_the_same_bits() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
         pool.install(|| field(&points, &grid, &settings(method, 1e-3, InstructionSet::detect())).field)
     };
-    for method in [Method::Direct, Method::Tiles] {
+    for method in [Method::Direct, Method::Tiles, Method::Planes] {
         assert_eq!(run(1, method), run(3, method), "{method:?}");
     }
 }

@@ -119,6 +119,14 @@ fn main() {
     if has("main") {
         main_case();
     }
+    if has("planes") {
+        let grid = Grid::new(1920, 1080, 8e-6, 8e-6).expect("grid");
+        let points = cloud(161_056, &grid, [-0.25, -0.20], false);
+        let reference = Reference::new(&points, &grid, 500);
+        for error in [5e-3, 1.9e-3, 1.2e-3, 5e-4] {
+            run("main", &points, &grid, &settings(Some(Method::Planes), error), Some(&reference), 5);
+        }
+    }
     if has("sets") {
         let grid = Grid::new(1920, 1080, 8e-6, 8e-6).expect("grid");
         let points = cloud(5_000, &grid, [-0.25, -0.20], false);

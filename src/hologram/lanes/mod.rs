@@ -87,13 +87,17 @@ pub(crate) unsafe trait Lanes: Copy {
     unsafe fn number(index: Self::Index) -> Self;
     /// `table[index]` of sixteen values.
     unsafe fn lookup(table: *const f32, index: Self::Index) -> Self;
+    /// Real and imaginary parts of `COUNT` interleaved complex values.
+    unsafe fn load_complex(from: *const f32) -> (Self, Self);
+    /// The reverse of [`Lanes::load_complex`].
+    unsafe fn store_complex(re: Self, im: Self, to: *mut f32);
     /// Where a ≤ b: `self`, elsewhere 0.
     unsafe fn where_le(self, a: Self, b: Self) -> Self;
 }
 
 /// cos(2πf) = Σ C·f²ⁿ and sin(2πf) = f·Σ S·f²ⁿ on |f| ≤ ½: minimax fits, largest error 1e-6 and 2e-7.
 const COS: [f32; 6] = [0.999_999_2, -19.738_98, 64.928_66, -85.271_62, 58.790_49, -21.071_106];
-const SIN: [f32; 6] = [6.283_185, -41.341_59, 81.599_945, -76.614_47, 41.342_88, -12.471_244];
+const SIN: [f32; 6] = [std::f32::consts::TAU, -41.341_59, 81.599_945, -76.614_47, 41.342_88, -12.471_244];
 
 /// (cos 2πx, sin 2πx), x in turns of any size that f32 resolves.
 ///
@@ -173,9 +177,9 @@ pub(crate) use dispatch;
 mod tests {
     use super::*;
 
-    /// Eight results a lane of every operation.
+    /// Nine results a lane of every operation.
     #[inline(always)]
-    unsafe fn operations<L: Lanes>(x: &[f32; 16], table: &[f32; 16], out: &mut [[f32; 16]; 8]) {
+    unsafe fn operations<L: Lanes>(x: &[f32; 16], table: &[f32; 16], out: &mut [[f32; 16]; 9]) {
         let mut i = 0;
         while i < 16 {
             // SAFETY: sixteen values are a multiple of every lane count.
@@ -183,6 +187,12 @@ mod tests {
                 let v = L::load(x.as_ptr().add(i));
                 let (c, s) = cos_sin(v);
                 let index = v.max(L::splat(0.0)).min(L::splat(15.0)).index();
+                // Interleaved and back, parts exchanged on the way.
+                let mut pairs = [0.0f32; 32];
+                L::store_complex(v.sub(L::splat(1.0)), v, pairs.as_mut_ptr());
+                let (lower, upper) = L::load_complex(pairs.as_ptr());
+                let exact = pairs[0] == x[i] - 1.0 && pairs[3] == x[i + 1];
+                let back = if exact { upper.sub(lower) } else { L::splat(0.0) };
                 let all = [
                     c,
                     s,
@@ -192,6 +202,7 @@ mod tests {
                     v.fnma(L::splat(0.5), v).div(L::splat(3.0)),
                     v.add(v).sub(L::splat(1.0)).mul(v),
                     v.where_le(v, L::splat(1.0)),
+                    back,
                 ];
                 for (row, value) in out.iter_mut().zip(all) {
                     value.store(row.as_mut_ptr().add(i));
@@ -206,11 +217,11 @@ mod tests {
         let x: [f32; 16] = std::array::from_fn(|i| -3.3 + 1.37 * i as f32);
         let table: [f32; 16] = std::array::from_fn(|i| (i * i) as f32);
         for set in InstructionSet::available() {
-            let mut out = [[0.0; 16]; 8];
+            let mut out = [[0.0; 16]; 9];
             // SAFETY: the set was detected.
             unsafe {
                 let (x, table, out) = (&x, &table, &mut out);
-                dispatch!(set, operations(x: &[f32; 16], table: &[f32; 16], out: &mut [[f32; 16]; 8]));
+                dispatch!(set, operations(x: &[f32; 16], table: &[f32; 16], out: &mut [[f32; 16]; 9]));
             }
             for i in 0..16 {
                 let v = f64::from(x[i]);
@@ -226,6 +237,7 @@ mod tests {
                     (v - 0.5 * v) / 3.0,
                     (2.0 * v - 1.0) * v,
                     masked,
+                    1.0,
                 ];
                 for (row, expected) in out.iter().zip(expected) {
                     let error = (f64::from(row[i]) - expected).abs();

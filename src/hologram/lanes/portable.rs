@@ -85,6 +85,18 @@ unsafe impl Lanes for Portable {
         each(|i| unsafe { *table.add(index[i] as usize) })
     }
     #[inline(always)]
+    unsafe fn load_complex(from: *const f32) -> (Self, Self) {
+        // SAFETY: sixteen readable values, as promised.
+        let pairs = unsafe { from.cast::<[f32; 16]>().read_unaligned() };
+        (each(|i| pairs[2 * i]), each(|i| pairs[2 * i + 1]))
+    }
+    #[inline(always)]
+    unsafe fn store_complex(re: Self, im: Self, to: *mut f32) {
+        let pairs: [f32; 16] = std::array::from_fn(|i| if i % 2 == 0 { re.0[i / 2] } else { im.0[i / 2] });
+        // SAFETY: sixteen writable values, as promised.
+        unsafe { to.cast::<[f32; 16]>().write_unaligned(pairs) }
+    }
+    #[inline(always)]
     unsafe fn where_le(self, a: Self, b: Self) -> Self {
         each(|i| if a.0[i] <= b.0[i] { self.0[i] } else { 0.0 })
     }

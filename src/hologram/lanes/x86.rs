@@ -96,6 +96,26 @@ unsafe impl Lanes for Avx512 {
         unsafe { Self(_mm512_permutexvar_ps(index, _mm512_loadu_ps(table))) }
     }
     #[inline(always)]
+    unsafe fn load_complex(from: *const f32) -> (Self, Self) {
+        // SAFETY: readable as promised.
+        unsafe {
+            let (a, b) = (_mm512_loadu_ps(from), _mm512_loadu_ps(from.add(16)));
+            let even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+            let odd = _mm512_add_epi32(even, _mm512_set1_epi32(1));
+            (Self(_mm512_permutex2var_ps(a, even, b)), Self(_mm512_permutex2var_ps(a, odd, b)))
+        }
+    }
+    #[inline(always)]
+    unsafe fn store_complex(re: Self, im: Self, to: *mut f32) {
+        // SAFETY: writable as promised.
+        unsafe {
+            let low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+            let high = _mm512_add_epi32(low, _mm512_set1_epi32(8));
+            _mm512_storeu_ps(to, _mm512_permutex2var_ps(re.0, low, im.0));
+            _mm512_storeu_ps(to.add(16), _mm512_permutex2var_ps(re.0, high, im.0));
+        }
+    }
+    #[inline(always)]
     unsafe fn where_le(self, a: Self, b: Self) -> Self {
         // SAFETY: the caller is where the set is present.
         unsafe { Self(_mm512_maskz_mov_ps(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a.0, b.0), self.0)) }
@@ -189,6 +209,26 @@ unsafe impl Lanes for Avx2 {
             let high = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table.add(8)), index);
             // Bit 3 of the index, moved to the sign, chooses the upper half.
             Self(_mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<28>(index))))
+        }
+    }
+    #[inline(always)]
+    unsafe fn load_complex(from: *const f32) -> (Self, Self) {
+        // SAFETY: readable as promised.
+        unsafe {
+            let (a, b) = (_mm256_loadu_ps(from), _mm256_loadu_ps(from.add(8)));
+            let low = _mm256_permute2f128_ps::<0x20>(a, b);
+            let high = _mm256_permute2f128_ps::<0x31>(a, b);
+            // Each half now holds pairs 0 1 | 4 5 and 2 3 | 6 7: one shuffle sorts the parts within the halves.
+            (Self(_mm256_shuffle_ps::<0x88>(low, high)), Self(_mm256_shuffle_ps::<0xdd>(low, high)))
+        }
+    }
+    #[inline(always)]
+    unsafe fn store_complex(re: Self, im: Self, to: *mut f32) {
+        // SAFETY: writable as promised.
+        unsafe {
+            let (low, high) = (_mm256_unpacklo_ps(re.0, im.0), _mm256_unpackhi_ps(re.0, im.0));
+            _mm256_storeu_ps(to, _mm256_permute2f128_ps::<0x20>(low, high));
+            _mm256_storeu_ps(to.add(8), _mm256_permute2f128_ps::<0x31>(low, high));
         }
     }
     #[inline(always)]

@@ -1,0 +1,321 @@
+//! Painting: each point as the outer product of two tabulated kernels, onto the plane that is nearest to it.
+//!
+//! Points are sorted into bins of pixels; a bin is painted into a patch of its own that stays in the second-level cache,
+//! patches of a wave are painted in parallel, and then added to the plane row by row in the bins' order, so that the
+//! sum does not depend on the number of threads.
+
+use super::table::Table;
+use crate::field::Complex32;
+use crate::hologram::lanes::{Aligned, InstructionSet, Lanes, dispatch};
+use crate::progress::Progress;
+use rayon::prelude::*;
+
+/// Points painted together: a patch's row is loaded and stored once for all of them.
+const GROUP: usize = 3;
+
+/// Side of a bin [px].
+pub(super) const BIN: usize = 64;
+
+/// Patches that are painted before they are added.
+const WAVE: usize = 64;
+
+/// Rows that one task adds to.
+const BAND: usize = 16;
+
+/// A point relative to its plane.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Dab {
+    /// Fractional column and row on the plane.
+    pub(super) at: [f64; 2],
+    /// Signed depth from the plane [m].
+    pub(super) d: f64,
+    /// Amplitude and phase, without what the kernels carry.
+    pub(super) factor: [f32; 2],
+}
+
+/// What all dabs share.
+#[derive(Debug)]
+pub(super) struct Brush<'a> {
+    /// Kernels along x and y.
+    pub(super) tables: [&'a Table; 2],
+    /// Half width of the painted span per metre of depth [px/m], along x and y.
+    pub(super) slope: [f64; 2],
+    /// Pixels painted beyond the cone.
+    pub(super) tail: f64,
+    /// Number of moments: plane r takes the dab times (d/h)^r.
+    pub(super) rank: usize,
+    /// Largest |d|, h [m].
+    pub(super) depth: f64,
+}
+
+/// The moments of one plane; `width` columns, `height` rows each.
+#[derive(Debug)]
+pub(super) struct Canvas<'a> {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) moments: &'a mut [Vec<Complex32>],
+}
+
+#[derive(Debug, Default)]
+struct Patch {
+    first: [usize; 2],
+    width: usize,
+    height: usize,
+    re: Aligned,
+    im: Aligned,
+}
+
+/// Paints dabs, which must lie on the canvas with their whole kernels; false when asked to stop.
+pub(super) fn paint(
+    canvas: &mut Canvas,
+    brush: &Brush,
+    dabs: &[Dab],
+    set: InstructionSet,
+    progress: &Progress,
+) -> bool {
+    let bins = bins(dabs, canvas.width);
+    let mut patches: Vec<Patch> = Vec::new();
+    patches.resize_with(WAVE.min(bins.len()), Patch::default);
+    for wave in bins.chunks(WAVE) {
+        patches.par_iter_mut().zip(wave).for_each(|(patch, bin)| {
+            if !progress.stopped() {
+                paint_bin(patch, brush, dabs, bin, set);
+            }
+        });
+        if progress.stopped() {
+            return false;
+        }
+        let patches = &patches[..wave.len()];
+        for (r, plane) in canvas.moments.iter_mut().enumerate() {
+            let width = canvas.width;
+            plane.par_chunks_mut(width * BAND).enumerate().for_each(|(band, rows)| {
+                for patch in patches {
+                    add_patch(patch, r, band * BAND, width, rows);
+                }
+            });
+        }
+        progress.advance(wave.iter().map(|bin| bin.len() as u64).sum());
+    }
+    true
+}
+
+/// Indexes of the dabs of each bin that has any, bins in row-major order, within a bin near ones beside each other.
+fn bins(dabs: &[Dab], width: usize) -> Vec<Vec<u32>> {
+    let across = width.div_ceil(BIN) as u64;
+    let key = |dab: &Dab| {
+        let [x, y] = dab.at.map(|p| p as u64);
+        let bin = (y / BIN as u64) * across + x / BIN as u64;
+        // Quarters of depth first, then 16-pixel cells in boustrophedon order: a group's kernels are of similar size
+        // and place, so little of their union is wasted.
+        let (cx, cy) = (x % BIN as u64 / 16, y % BIN as u64 / 16);
+        (bin, cy * 4 + if cy % 2 == 0 { cx } else { 3 - cx })
+    };
+    let mut order: Vec<(u64, u64, u32)> = dabs
+        .iter()
+        .enumerate()
+        .map(|(i, dab)| {
+            let (bin, cell) = key(dab);
+            (bin, cell, i as u32)
+        })
+        .collect();
+    order.par_sort_unstable_by(|a, b| {
+        (a.0, a.1)
+            .cmp(&(b.0, b.1))
+            .then(dabs[a.2 as usize].d.abs().total_cmp(&dabs[b.2 as usize].d.abs()))
+            .then(a.2.cmp(&b.2))
+    });
+    order.chunk_by(|a, b| a.0 == b.0).map(|bin| bin.iter().map(|entry| entry.2).collect()).collect()
+}
+
+/// Half size of a dab's kernel [px].
+fn reach(brush: &Brush, axis: usize, d: f64) -> f64 {
+    d.abs() * brush.slope[axis] + brush.tail
+}
+
+fn paint_bin(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32], set: InstructionSet) {
+    let mut span = [[usize::MAX, 0]; 2];
+    for &i in bin {
+        let dab = &dabs[i as usize];
+        for axis in 0..2 {
+            let reach = reach(brush, axis, dab.d);
+            let first = (dab.at[axis] - reach).max(0.0) as usize;
+            let last = (dab.at[axis] + reach) as usize + 2;
+            span[axis] = [span[axis][0].min(first), span[axis][1].max(last)];
+        }
+    }
+    patch.first = [span[0][0], span[1][0]];
+    patch.width = (span[0][1] - span[0][0]).next_multiple_of(16);
+    patch.height = span[1][1] - span[1][0];
+    let size = patch.width * patch.height * brush.rank;
+    for part in [&mut patch.re, &mut patch.im] {
+        part.reserve(size);
+        part.values_mut()[..size].fill(0.0);
+    }
+    // SAFETY: the set was detected on this machine.
+    unsafe {
+        dispatch!(set, paint_groups(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32]));
+    }
+}
+
+/// # Safety
+/// The instruction set of `L` must be enabled.
+#[inline(always)]
+unsafe fn paint_groups<L: Lanes>(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32]) {
+    let (width, height) = (patch.width, patch.height);
+    // Kernels of a group: x as re and im of `width`, y as re and im of one dab, then (re, im) of all dabs by row.
+    let tall = height.next_multiple_of(16) + 16;
+    let mut lines = Aligned::default();
+    lines.reserve(GROUP * 2 * (width + 16) + 2 * tall + GROUP * 2 * tall);
+    let (xs, rest) = lines.values_mut().split_at_mut(GROUP * 2 * (width + 16));
+    let (line, ys) = rest.split_at_mut(2 * tall);
+    for group in bin.chunks(GROUP) {
+        let (mut span_x, mut span_y) = ([usize::MAX, 0], [usize::MAX, 0]);
+        for &i in group {
+            let dab = &dabs[i as usize];
+            for (axis, span) in [(0, &mut span_x), (1, &mut span_y)] {
+                let reach = reach(brush, axis, dab.d);
+                let first = ((dab.at[axis] - reach).max(0.0) as usize).saturating_sub(patch.first[axis]);
+                let last = (dab.at[axis] + reach) as usize + 2 - patch.first[axis];
+                *span = [span[0].min(first), span[1].max(last)];
+            }
+        }
+        // Whole vectors, from an aligned one: the patch's width is a multiple of sixteen.
+        let first = span_x[0] / L::COUNT * L::COUNT;
+        let columns = (span_x[1].min(width) - first).next_multiple_of(L::COUNT);
+        let rows = span_y[1].min(height) - span_y[0];
+        if group.len() < GROUP {
+            xs[group.len() * 2 * columns..GROUP * 2 * columns].fill(0.0);
+            ys[..rows * GROUP * 2].fill(0.0);
+        }
+        // SAFETY: `columns` ≤ width and `rows` rounded up ≤ tall fit their lines; spans lie inside the patch.
+        unsafe {
+            for (n, &i) in group.iter().enumerate() {
+                let dab = &dabs[i as usize];
+                let x = xs.as_mut_ptr().add(n * 2 * columns);
+                let start = (patch.first[0] + first) as isize;
+                brush.tables[0].write::<L>(dab.d, dab.at[0], start, columns, x, x.add(columns));
+                let start = (patch.first[1] + span_y[0]) as isize;
+                let y = line.as_mut_ptr();
+                let padded = rows.next_multiple_of(L::COUNT);
+                brush.tables[1].write::<L>(dab.d, dab.at[1], start, padded, y, y.add(tall));
+                let [a, b] = dab.factor;
+                for row in 0..rows {
+                    let (re, im) = (line[row], line[tall + row]);
+                    ys[(row * GROUP + n) * 2] = re * a - im * b;
+                    ys[(row * GROUP + n) * 2 + 1] = re * b + im * a;
+                }
+            }
+            for r in 0..brush.rank {
+                if r > 0 {
+                    let scale: [f32; GROUP] = std::array::from_fn(|n| {
+                        group.get(n).map_or(0.0, |&i| (dabs[i as usize].d / brush.depth) as f32)
+                    });
+                    for y in ys[..rows * GROUP * 2].chunks_exact_mut(GROUP * 2) {
+                        for n in 0..GROUP {
+                            y[2 * n] *= scale[n];
+                            y[2 * n + 1] *= scale[n];
+                        }
+                    }
+                }
+                let at = (r * height + span_y[0]) * width + first;
+                let (re, im) = (patch.re.values_mut(), patch.im.values_mut());
+                assert!(at + (rows - 1) * width + columns <= re.len() && re.len() == im.len());
+                let (re, im) = (re.as_mut_ptr().add(at), im.as_mut_ptr().add(at));
+                update::<L>(re, im, width, xs.as_ptr(), columns, ys.as_ptr(), rows);
+            }
+        }
+    }
+}
+
+/// Adds Σ_n y[row][n]·x[n] to `rows` × `columns` values of a patch.
+#[inline(always)]
+unsafe fn update<L: Lanes>(
+    re: *mut f32,
+    im: *mut f32,
+    stride: usize,
+    xs: *const f32,
+    columns: usize,
+    ys: *const f32,
+    rows: usize,
+) {
+    let mut column = 0;
+    // SAFETY: the caller's promise.
+    unsafe {
+        if L::COUNT == 16 {
+            while column + 2 * L::COUNT <= columns {
+                strip::<L, 2>(re, im, stride, xs, columns, ys, rows, column);
+                column += 2 * L::COUNT;
+            }
+        }
+        while column < columns {
+            strip::<L, 1>(re, im, stride, xs, columns, ys, rows, column);
+            column += L::COUNT;
+        }
+    }
+}
+
+#[inline(always)]
+#[allow(clippy::too_many_arguments)] // the innermost loop of the engine: every argument is a register
+unsafe fn strip<L: Lanes, const V: usize>(
+    re: *mut f32,
+    im: *mut f32,
+    stride: usize,
+    xs: *const f32,
+    columns: usize,
+    ys: *const f32,
+    rows: usize,
+    column: usize,
+) {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let zero = L::splat(0.0);
+        let mut xr = [[zero; V]; GROUP];
+        let mut xi = [[zero; V]; GROUP];
+        for n in 0..GROUP {
+            for v in 0..V {
+                let from = xs.add(n * 2 * columns + column + v * L::COUNT);
+                xr[n][v] = L::load(from);
+                xi[n][v] = L::load(from.add(columns));
+            }
+        }
+        for row in 0..rows {
+            let to_re = re.add(row * stride + column);
+            let to_im = im.add(row * stride + column);
+            let mut a = [zero; V];
+            let mut b = [zero; V];
+            for v in 0..V {
+                a[v] = L::load(to_re.add(v * L::COUNT));
+                b[v] = L::load(to_im.add(v * L::COUNT));
+            }
+            for n in 0..GROUP {
+                let y = ys.add((row * GROUP + n) * 2);
+                let (yr, yi) = (L::splat(*y), L::splat(*y.add(1)));
+                for v in 0..V {
+                    a[v] = yi.fnma(xi[n][v], yr.fma(xr[n][v], a[v]));
+                    b[v] = yi.fma(xr[n][v], yr.fma(xi[n][v], b[v]));
+                }
+            }
+            for v in 0..V {
+                a[v].store(to_re.add(v * L::COUNT));
+                b[v].store(to_im.add(v * L::COUNT));
+            }
+        }
+    }
+}
+
+/// Adds moment `r` of a patch to the rows of a plane that begin at `first`.
+fn add_patch(patch: &Patch, r: usize, first: usize, width: usize, rows: &mut [Complex32]) {
+    let count = rows.len() / width;
+    let low = first.max(patch.first[1]);
+    let high = (first + count).min(patch.first[1] + patch.height);
+    let columns = patch.width.min(width - patch.first[0]);
+    for row in low..high {
+        let from = (r * patch.height + row - patch.first[1]) * patch.width;
+        let to = (row - first) * width + patch.first[0];
+        let parts = patch.re.values()[from..from + columns].iter().zip(&patch.im.values()[from..from + columns]);
+        for (u, (re, im)) in rows[to..to + columns].iter_mut().zip(parts) {
+            u.re += re;
+            u.im += im;
+        }
+    }
+}
