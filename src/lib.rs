@@ -46,6 +46,7 @@ pub mod points;
 pub mod progress;
 pub mod random;
 pub mod scene;
+pub mod serve;
 pub mod units;
 
 pub use error::{Error, Result};
