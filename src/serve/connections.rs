@@ -249,7 +249,7 @@ impl Conversation<'_> {
             Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Err(error),
             Err(error) => {
                 self.shared.count(REFUSED);
-                return self.reply(answer(Err(&error.to_string())).as_bytes());
+                return self.reply(answer(Err(error.to_string())).as_bytes());
             }
         };
         let wish = slmsuite::read(&line, panel);
@@ -264,7 +264,7 @@ impl Conversation<'_> {
                 Err(why)
             }
         };
-        self.reply(answer(met.as_ref().map(Clone::clone).map_err(String::as_str)).as_bytes())
+        self.reply(answer(met).as_bytes())
     }
 
     /// Frame after frame, until the client goes or sends what has no end that can be found.

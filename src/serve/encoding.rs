@@ -30,7 +30,7 @@ pub(super) fn quote_plus(plain: &[u8]) -> String {
 
 /// Undoes base64 (RFC 4648, section 4, with padding). None for anything else.
 pub(super) fn base64(text: &[u8]) -> Option<Vec<u8>> {
-    if text.len() % 4 != 0 {
+    if !text.len().is_multiple_of(4) {
         return None;
     }
     let padding = text.iter().rev().take_while(|&&byte| byte == b'=').count();

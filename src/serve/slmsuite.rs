@@ -111,7 +111,7 @@ fn unpack(packed: &Packed, panel: &ServedPanel) -> Result<SentLevels, String> {
 }
 
 /// The answer to a wish that was met, or the reason why not, as the line to send.
-pub(super) fn answer(met: Result<Value, &str>) -> String {
+pub(super) fn answer(met: Result<Value, String>) -> String {
     let reply = match met {
         Ok(value) => json!([true, value]),
         Err(why) => json!([false, why]),
@@ -179,7 +179,7 @@ mod tests {
         let mut text: String = (0..letters)
             .map(|letter| char::from(LETTERS[(0..6).fold(0, |value, i| value << 1 | usize::from(bit(6 * letter + i)))]))
             .collect();
-        while text.len() % 4 != 0 {
+        while !text.len().is_multiple_of(4) {
             text.push('=');
         }
         text
