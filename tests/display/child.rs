@@ -217,9 +217,13 @@ impl Running {
 
     /// The first line that it prints.
     pub(crate) fn line(&mut self) -> String {
+        // Byte by byte: what comes after the line is the report's.
         let output = self.process.stdout.as_mut().expect("output");
-        let bytes = output.bytes().map_while(Result::ok).take_while(|&byte| byte != b'\n');
-        String::from_utf8_lossy(&bytes.collect::<Vec<u8>>()).into_owned()
+        let (mut line, mut byte) = (Vec::new(), [0]);
+        while output.read_exact(&mut byte).is_ok() && byte != *b"\n" {
+            line.push(byte[0]);
+        }
+        String::from_utf8_lossy(&line).into_owned()
     }
 
     /// Tells it to present the next frame.
