@@ -70,6 +70,7 @@ pub mod propagation;
 pub mod random;
 pub mod reconstruction;
 pub mod scene;
+pub mod serve;
 pub mod units;
 
 pub use error::{Error, Result};

@@ -2,7 +2,8 @@
 //!
 //! [`Display`] is the connection to the window system. [`Display::monitors`] lists what there is; [`MonitorChoice`]
 //! names one by connector, EDID, serial number or place. [`PanelWindow`] covers one monitor exactly and keeps it so;
-//! [`show`] does the whole for one frame, [`play`] for a sequence of them.
+//! [`show`] does the whole for one frame, [`play`] for a sequence of them, [`serve`] for what other programs
+//! send.
 //! [`examine`] looks at everything that is known to spoil levels, and [`test_card`] shows it to an eye.
 //!
 //! # What is promised
@@ -22,6 +23,7 @@ mod frame;
 mod monitor;
 mod play;
 mod presenter;
+mod serving;
 mod session;
 mod show;
 mod test_card;
@@ -35,6 +37,7 @@ pub use frame::DisplayFrame;
 pub use monitor::{Gamma, Monitor, MonitorChoice, ScanOut};
 pub use play::{FrameTime, PlayReport, PlaySettings, play};
 pub use presenter::Presenter;
+pub use serving::{ServingReport, serve};
 pub use session::Display;
 pub use show::{OnAbsence, ShowEnd, ShowReport, ShowSettings, show};
 pub use test_card::test_card;

@@ -13,6 +13,7 @@ mod monitors;
 mod ownership;
 mod pixels;
 mod server;
+mod serving;
 mod timing;
 mod window_manager;
 
@@ -24,8 +25,10 @@ use std::time::Instant;
 /// How a test ended that did not panic.
 pub(crate) enum Ended {
     Passed,
-    /// This machine lacks something; what.
+    /// This machine lacks something that a display test needs; what.
     NotRun(String),
+    /// Something is not there that no one needs to have; what.
+    Optional(String),
 }
 
 /// A test and its name.
@@ -37,7 +40,8 @@ fn main() -> ExitCode {
     }
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let cases: Vec<Case> =
-        [monitors::CASES, pixels::CASES, ownership::CASES, timing::CASES, window_manager::CASES].concat();
+        [monitors::CASES, pixels::CASES, ownership::CASES, timing::CASES, serving::CASES, window_manager::CASES]
+            .concat();
     if arguments.iter().any(|argument| argument == "--list") {
         cases.iter().for_each(|(name, _)| println!("{name}: test"));
         return ExitCode::SUCCESS;
@@ -49,7 +53,7 @@ fn main() -> ExitCode {
     println!("\nrunning {total} tests");
     let (mut passed, mut failed, mut ignored) = (0, 0, 0);
     let required = std::env::var_os("HOLODRIVE_REQUIRE_DISPLAY").is_some();
-    let mut not_run = |name: &str, why: &str| {
+    let mut not_run = |name: &str, why: &str, required: bool| {
         if required {
             println!("test {name} ... FAILED\n  could not run: {why}");
             failed += 1;
@@ -68,7 +72,8 @@ fn main() -> ExitCode {
                         println!("test {name} ... ok");
                         passed += 1;
                     }
-                    Ok(Ended::NotRun(why)) => not_run(name, &why),
+                    Ok(Ended::NotRun(why)) => not_run(name, &why, required),
+                    Ok(Ended::Optional(why)) => not_run(name, &why, false),
                     Err(_) => {
                         println!("test {name} ... FAILED");
                         failures += 1;
@@ -77,7 +82,7 @@ fn main() -> ExitCode {
             }
             failed += failures;
         }
-        Err(why) => chosen.iter().for_each(|(name, _)| not_run(name, &why)),
+        Err(why) => chosen.iter().for_each(|(name, _)| not_run(name, &why, required)),
     }
     println!(
         "\ntest result: {}. {passed} passed; {failed} failed; {ignored} ignored; 0 measured; {} filtered out; finished in {:.2}s\n",

@@ -1,0 +1,90 @@
+//! slmPy's protocol: in one connection, for each frame its length (32 bits, little-endian) and the frame: rows of 8-bit levels,
+//! raw, or compressed by zlib or gzip. The answer is `done` or `err`.
+//!
+//! slmPy can compress by bzip2 too; such frames are answered `err`.
+
+use super::{SentLevels, ServedPanel};
+use flate2::read::{GzDecoder, ZlibDecoder};
+use std::io::Read;
+
+/// The answer to a frame that is on the panel.
+pub(super) const DONE: &[u8] = b"done";
+/// The answer to one that is not.
+pub(super) const ERR: &[u8] = b"err";
+
+/// Longest frame as it is sent [bytes]: compression that fails adds below 1 %.
+pub(super) fn frame_limit(panel: &ServedPanel) -> usize {
+    panel.pixels() * 101 / 100 + 1024
+}
+
+/// Reads a frame as it was sent, its length without.
+pub(super) fn read(sent: &[u8], panel: &ServedPanel) -> Result<SentLevels, String> {
+    let expected = panel.pixels();
+    let mut unfolded = Vec::new();
+    let bytes = if sent.len() == expected {
+        sent
+    } else {
+        let unfold: Box<dyn Read> = match sent {
+            [0x1F, 0x8B, ..] => Box::new(GzDecoder::new(sent)),
+            [b'B', b'Z', b'h', ..] => return Err("frames compressed by bzip2 are not taken".into()),
+            _ => Box::new(ZlibDecoder::new(sent)),
+        };
+        let read = unfold.take(expected as u64 + 1).read_to_end(&mut unfolded);
+        if read.is_err() || unfolded.len() != expected {
+            return Err(format!("the frame does not unfold to {expected} bytes"));
+        }
+        &unfolded
+    };
+    panel.take(bytes.iter().copied().map(u16::from).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flate2::Compression;
+    use flate2::write::{GzEncoder, ZlibEncoder};
+    use proptest::prelude::*;
+    use std::io::Write;
+
+    fn panel() -> ServedPanel {
+        ServedPanel {
+            name: "panel".into(),
+            width: 40,
+            height: 30,
+            bits: 8,
+            pixel_pitch: [8e-6, 8e-6],
+            wavelength: 532e-9,
+            design_wavelength: 532e-9,
+            settle_time: 0.0,
+        }
+    }
+
+    #[test]
+    fn raw_zlib_and_gzip_frames_are_the_same() {
+        let raw: Vec<u8> = (0..1200u32).map(|i| (i * i % 251) as u8).collect();
+        let mut zlib = ZlibEncoder::new(Vec::new(), Compression::default());
+        zlib.write_all(&raw).expect("memory");
+        let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
+        gzip.write_all(&raw).expect("memory");
+        for sent in [raw.clone(), zlib.finish().expect("memory"), gzip.finish().expect("memory")] {
+            let levels = read(&sent, &panel()).expect("frame").levels;
+            assert!(levels.iter().zip(&raw).all(|(level, byte)| *level == u16::from(*byte)));
+        }
+    }
+
+    #[test]
+    fn bzip2_short_frames_and_bombs_are_refused() {
+        let mut bomb = ZlibEncoder::new(Vec::new(), Compression::best());
+        bomb.write_all(&vec![0; 10_000_000]).expect("memory");
+        for sent in [b"BZh91AY&SY".to_vec(), vec![0; 1199], Vec::new(), bomb.finish().expect("memory")] {
+            assert!(read(&sent, &panel()).is_err());
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_judged_without_panic(sent in prop::collection::vec(any::<u8>(), 0..2000)) {
+            let _ = read(&sent, &panel());
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! slmsuite's remote protocol (its version 0.5): one request in a connection, JSON in percent-encoding, one line each
+//! way.
+//!
+//! `RemoteSLM` asks `ping` and `pickle` when it is made, then sends `_set_phase_hw` for each frame: final drive levels,
+//! to which neither correction nor look-up table are to be applied again.
+
+use super::encoding::{base64, quote_plus, unquote_plus};
+use super::{SentLevels, ServedPanel};
+use flate2::read::ZlibDecoder;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use serde_json::{Value, json};
+use std::io::Read;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// The version whose protocol is spoken; the client warns when its own differs.
+const VERSION: &str = "0.5.0";
+/// Bytes of a request beside its frame.
+const HEAD: usize = 64 * 1024;
+
+/// What a client wants.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Wish {
+    /// To know what there is.
+    Ping,
+    /// To know the panel.
+    Describe,
+    /// To show a frame.
+    Show(SentLevels),
+}
+
+/// Only what is needed is kept of a request: a tree of a hostile one could be many times its size.
+#[derive(Deserialize)]
+struct Request {
+    name: Option<String>,
+    command: Option<String>,
+    #[serde(default, rename = "args")]
+    _args: Option<IgnoredAny>,
+    #[serde(default)]
+    kwargs: Option<Named>,
+}
+
+#[derive(Deserialize)]
+struct Named {
+    display: Option<Packed>,
+}
+
+#[derive(Deserialize)]
+struct Packed {
+    #[serde(rename = "__zlib__")]
+    zlib: String,
+    #[serde(rename = "__shape__")]
+    shape: Vec<u64>,
+    #[serde(rename = "__dtype__")]
+    dtype: String,
+}
+
+/// Longest request that can carry a frame of `panel` [bytes].
+///
+/// Two bytes a level, zlib's worst growth below 1 %, base64 4/3, and each of its characters three when quoted.
+pub(super) fn request_limit(panel: &ServedPanel) -> usize {
+    HEAD + 2 * panel.pixels() * 101 / 100 * 4
+}
+
+/// Reads a request: the line without its end. The error is an answer to the client.
+pub(super) fn read(line: &[u8], panel: &ServedPanel) -> Result<Wish, String> {
+    let plain = unquote_plus(line).ok_or("The request is not percent-encoded.")?;
+    let request: Request =
+        serde_json::from_slice(&plain).map_err(|error| format!("The request is not understood: {error}."))?;
+    let command = request.command.ok_or("No command provided.")?;
+    if command == "ping" {
+        return Ok(Wish::Ping);
+    }
+    let name = request.name.unwrap_or_default();
+    if name != panel.name {
+        return Err(format!("Did not recognize hardware '{name}'. Options: ['{}'].", panel.name));
+    }
+    match command.as_str() {
+        "pickle" => Ok(Wish::Describe),
+        "_set_phase_hw" => {
+            let packed = request.kwargs.and_then(|named| named.display).ok_or("_set_phase_hw carries no display.")?;
+            unpack(&packed, panel).map(Wish::Show)
+        }
+        _ => Err(format!("{name}.{command} not present.")),
+    }
+}
+
+fn unpack(packed: &Packed, panel: &ServedPanel) -> Result<SentLevels, String> {
+    if packed.shape != [u64::from(panel.height), u64::from(panel.width)] {
+        let (width, height) = (panel.width, panel.height);
+        return Err(format!("The display is of shape {:?}, the panel of [{height}, {width}].", packed.shape));
+    }
+    let bytes_of_level = match packed.dtype.as_str() {
+        "uint8" => 1,
+        "uint16" => 2,
+        other => return Err(format!("The display is of type {other}; uint8 and uint16 are taken.")),
+    };
+    let zlib = base64(packed.zlib.as_bytes()).ok_or("The display is not in base64.")?;
+    let expected = panel.pixels() * bytes_of_level;
+    let mut bytes = Vec::with_capacity(expected);
+    // One byte more than expected shows that there is too much, whatever a small text would unfold to.
+    let read = ZlibDecoder::new(zlib.as_slice()).take(expected as u64 + 1).read_to_end(&mut bytes);
+    if read.is_err() || bytes.len() != expected {
+        return Err(format!("The display does not unfold to {expected} bytes."));
+    }
+    let levels = match bytes_of_level {
+        1 => bytes.into_iter().map(u16::from).collect(),
+        _ => bytes.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect(),
+    };
+    panel.take(levels)
+}
+
+/// The answer to a wish that was met, or the reason why not, as the line to send.
+pub(super) fn answer(met: Result<Value, String>) -> String {
+    let reply = match met {
+        Ok(value) => json!([true, value]),
+        Err(why) => json!([false, why]),
+    };
+    let mut line = quote_plus(reply.to_string().as_bytes());
+    line.push('\n');
+    line
+}
+
+/// The answer to `ping`.
+pub(super) fn hardware(panel: &ServedPanel) -> Value {
+    json!({ panel.name.as_str(): "slm" })
+}
+
+/// The answer to `pickle`: what a client must know of the panel, in slmsuite's names and micrometres.
+pub(super) fn description(panel: &ServedPanel) -> Value {
+    let [pitch_x, pitch_y] = panel.pixel_pitch;
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64());
+    json!({
+        "__version__": VERSION,
+        "__time__": format!("{now:.3} s after 1970-01-01 UTC"),
+        "__timestamp__": now,
+        "__meta__": {
+            "__class__": "SLM",
+            "name": panel.name,
+            "shape": [panel.height, panel.width],
+            "bitdepth": panel.bits,
+            "bitresolution": 1u32 << panel.bits,
+            "pitch_um": [pitch_x * 1e6, pitch_y * 1e6],
+            "pitch": [pitch_x / panel.wavelength, pitch_y / panel.wavelength],
+            "settle_time_s": panel.settle_time,
+            "wav_um": panel.wavelength * 1e6,
+            "wav_design_um": panel.design_wavelength * 1e6,
+            "phase_scaling": panel.design_wavelength / panel.wavelength,
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flate2::Compression;
+    use flate2::write::ZlibEncoder;
+    use proptest::prelude::*;
+    use std::io::Write;
+
+    fn panel() -> ServedPanel {
+        ServedPanel {
+            name: "panel".into(),
+            width: 5,
+            height: 3,
+            bits: 10,
+            pixel_pitch: [8e-6, 8e-6],
+            wavelength: 532e-9,
+            design_wavelength: 633e-9,
+            settle_time: 0.05,
+        }
+    }
+
+    /// Base64 by the rule, bit by bit.
+    fn to_base64(bytes: &[u8]) -> String {
+        const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+        let bit = |i: usize| bytes.get(i / 8).map_or(0, |byte| byte >> (7 - i % 8) & 1);
+        let letters = (bytes.len() * 8).div_ceil(6);
+        let mut text: String = (0..letters)
+            .map(|letter| char::from(LETTERS[(0..6).fold(0, |value, i| value << 1 | usize::from(bit(6 * letter + i)))]))
+            .collect();
+        while !text.len().is_multiple_of(4) {
+            text.push('=');
+        }
+        text
+    }
+
+    fn packed(bytes: &[u8]) -> String {
+        let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
+        encoder.write_all(bytes).expect("memory");
+        to_base64(&encoder.finish().expect("memory"))
+    }
+
+    fn request(shape: &str, dtype: &str, zlib: &str) -> String {
+        let json = format!(
+            r#"{{"name": "panel", "command": "_set_phase_hw", "args": [], "kwargs": {{"display": {{"__zlib__": "{zlib}", "__shape__": {shape}, "__dtype__": "{dtype}"}}, "block": true}}}}"#
+        );
+        quote_plus(json.as_bytes())
+    }
+
+    #[test]
+    fn frames_of_both_widths_are_read() {
+        let bytes: Vec<u8> = (0..15).map(|i| i * 17).collect();
+        let Ok(Wish::Show(sent)) = read(request("[3, 5]", "uint8", &packed(&bytes)).as_bytes(), &panel()) else {
+            panic!("not read");
+        };
+        assert_eq!((sent.width, sent.height), (5, 3));
+        assert!(sent.levels.iter().zip(&bytes).all(|(level, byte)| *level == u16::from(*byte)));
+        let words: Vec<u16> = (0..15).map(|i| i * 73).collect();
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        let Ok(Wish::Show(sent)) = read(request("[3, 5]", "uint16", &packed(&bytes)).as_bytes(), &panel()) else {
+            panic!("not read");
+        };
+        assert_eq!(sent.levels, words);
+    }
+
+    #[test]
+    fn what_is_wrong_is_answered_and_not_shown() {
+        let right = packed(&[0; 15]);
+        let above: Vec<u8> = [1024u16; 15].iter().flat_map(|word| word.to_le_bytes()).collect();
+        for (line, word) in [
+            (request("[5, 3]", "uint8", &right), "shape"),
+            (request("[3, 5, 1]", "uint8", &right), "shape"),
+            (request("[3, 5]", "float32", &right), "type"),
+            (request("[3, 5]", "uint16", &right), "unfold"),
+            (request("[3, 5]", "uint8", &packed(&[0; 14])), "unfold"),
+            // A bomb: 10 MB of zeros in a few kilobytes.
+            (request("[3, 5]", "uint8", &packed(&vec![0; 10_000_000])), "unfold"),
+            (request("[3, 5]", "uint8", &right[..8]), "unfold"),
+            (request("[3, 5]", "uint8", "!!!!"), "base64"),
+            (request("[3, 5]", "uint16", &packed(&above)), "1023"),
+            ("%7B".into(), "understood"),
+            ("%zz".into(), "percent"),
+            (quote_plus(br#"{"name": "panel"}"#), "command"),
+            (quote_plus(br#"{"name": "other", "command": "pickle"}"#), "recognize"),
+            (quote_plus(br#"{"name": "panel", "command": "__init__"}"#), "not present"),
+            (quote_plus(br#"{"name": "panel", "command": "_set_phase_hw", "kwargs": {}}"#), "no display"),
+        ] {
+            let why = read(line.as_bytes(), &panel()).expect_err(word);
+            assert!(why.contains(word), "{word}: {why}");
+        }
+    }
+
+    #[test]
+    fn the_panel_is_described_in_slmsuites_names() {
+        let ask = |command: &str| {
+            let json = format!(
+                r#"{{"name": "panel", "command": "{command}", "args": [], "kwargs": {{"attributes": false}}}}"#
+            );
+            read(quote_plus(json.as_bytes()).as_bytes(), &panel())
+        };
+        assert_eq!(ask("ping"), Ok(Wish::Ping));
+        assert_eq!(ask("pickle"), Ok(Wish::Describe));
+        assert_eq!(answer(Ok(hardware(&panel()))), "%5Btrue%2C%7B%22panel%22%3A%22slm%22%7D%5D\n");
+        let meta = &description(&panel())["__meta__"];
+        assert_eq!(meta["shape"], json!([3, 5]));
+        assert_eq!(meta["bitdepth"], 10);
+        assert_eq!(meta["bitresolution"], 1024);
+        assert!((meta["wav_um"].as_f64().expect("wavelength") - 0.532).abs() < 1e-12);
+        assert!((meta["pitch_um"][0].as_f64().expect("pitch") - 8.0).abs() < 1e-12);
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_answered_without_panic(line in prop::collection::vec(any::<u8>(), 0..400)) {
+            let _ = read(&line, &panel());
+        }
+    }
+}

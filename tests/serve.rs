@@ -1,0 +1,283 @@
+//! The server before its clients: what is right gets through whole, what is wrong is answered, and nothing that one
+//! client does is felt by another.
+
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use holodrive::serve::{FrameRequest, SentLevels, ServeSettings, ServedPanel, Server};
+use std::io::{ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+const WIDTH: u32 = 32;
+const HEIGHT: u32 = 24;
+
+fn panel() -> ServedPanel {
+    ServedPanel {
+        name: "panel".into(),
+        width: WIDTH,
+        height: HEIGHT,
+        bits: 8,
+        pixel_pitch: [8e-6; 2],
+        wavelength: 532e-9,
+        design_wavelength: 532e-9,
+        settle_time: 0.0,
+    }
+}
+
+fn settings(patience: Duration) -> ServeSettings {
+    let free = Some("127.0.0.1:0".parse().expect("address"));
+    ServeSettings { slmsuite: free, slmpy: free, connections: 16, patience }
+}
+
+/// Takes every frame as a panel would, and keeps them.
+struct Panel {
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<(Server, Vec<SentLevels>)>,
+}
+
+impl Panel {
+    fn run(server: Server) -> Self {
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || {
+            let mut shown = Vec::new();
+            while !stopped.load(Ordering::SeqCst) {
+                if let Some(request) = server.next(Duration::from_millis(5)) {
+                    shown.push(request.levels().clone());
+                    request.shown();
+                }
+            }
+            (server, shown)
+        });
+        Self { stop, thread }
+    }
+
+    fn end(self) -> (Server, Vec<SentLevels>) {
+        self.stop.store(true, Ordering::SeqCst);
+        self.thread.join().expect("panel")
+    }
+}
+
+/// A frame that differs in every level from its neighbours in time.
+fn frame(number: u32) -> Vec<u8> {
+    (0..WIDTH * HEIGHT)
+        .map(|i| (i.wrapping_mul(2_654_435_761).wrapping_add(number.wrapping_mul(97)) >> 7) as u8)
+        .collect()
+}
+
+fn zlib(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(bytes).expect("memory");
+    encoder.finish().expect("memory")
+}
+
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::new();
+    for three in bytes.chunks(3) {
+        let value = three.iter().fold(0u32, |value, &byte| value << 8 | u32::from(byte)) << (8 * (3 - three.len()));
+        for letter in 0..4 {
+            let index = (value >> (18 - 6 * letter) & 63) as usize;
+            text.push(if letter <= three.len() { char::from(LETTERS[index]) } else { '=' });
+        }
+    }
+    text
+}
+
+/// `quote_plus` as far as JSON and base64 need it.
+fn quoted(text: &str) -> Vec<u8> {
+    text.bytes()
+        .flat_map(|b| if b.is_ascii_alphanumeric() { vec![b] } else { format!("%{b:02X}").into_bytes() })
+        .collect()
+}
+
+fn request(levels: &[u8], height: u32) -> Vec<u8> {
+    let display = format!(
+        r#"{{"__zlib__": "{}", "__shape__": [{height}, {WIDTH}], "__dtype__": "uint8"}}"#,
+        base64(&zlib(levels))
+    );
+    let json =
+        format!(r#"{{"name": "panel", "command": "_set_phase_hw", "args": [], "kwargs": {{"display": {display}}}}}"#);
+    let mut line = quoted(&json);
+    line.push(b'\n');
+    line
+}
+
+fn ask(address: SocketAddr, line: &[u8]) -> String {
+    let mut stream = TcpStream::connect(address).expect("connect");
+    stream.set_read_timeout(Some(Duration::from_secs(30))).expect("timeout");
+    // A server that refuses may close before it has read all.
+    let _ = stream.write_all(line);
+    let mut answer = String::new();
+    match stream.read_to_string(&mut answer) {
+        Ok(_) => answer,
+        Err(error) if error.kind() == ErrorKind::ConnectionReset => answer,
+        Err(error) => panic!("no answer: {error}"),
+    }
+}
+
+const SHOWN: &str = "%5Btrue%2Cnull%5D\n";
+
+#[test]
+fn a_client_is_answered_only_when_its_frame_is_shown() {
+    let server = Server::start(panel(), &settings(Duration::from_secs(20))).expect("server");
+    let address = server.slmsuite().expect("address");
+    let client = std::thread::spawn(move || {
+        let answer = ask(address, &request(&frame(3), HEIGHT));
+        (answer, Instant::now())
+    });
+    let waiting: FrameRequest = server.next(Duration::from_secs(20)).expect("frame");
+    assert!(waiting.levels().levels.iter().zip(frame(3)).all(|(level, byte)| *level == u16::from(byte)));
+    std::thread::sleep(Duration::from_millis(200));
+    let shown = Instant::now();
+    waiting.shown();
+    let (answer, answered) = client.join().expect("client");
+    assert_eq!(answer, SHOWN);
+    assert!(answered > shown);
+}
+
+#[test]
+fn a_refusal_and_a_panel_that_does_not_answer_are_told() {
+    let server = Server::start(panel(), &settings(Duration::from_millis(300))).expect("server");
+    let address = server.slmsuite().expect("address");
+    let client = std::thread::spawn(move || [1, 2].map(|number| ask(address, &request(&frame(number), HEIGHT))));
+    server.next(Duration::from_secs(20)).expect("frame").refused("the monitor is gone");
+    // The second frame is left lying until its client has been told; it must not come late.
+    std::thread::sleep(Duration::from_millis(900));
+    let [refused, late] = client.join().expect("client");
+    assert!(refused.contains("false") && refused.contains("monitor"), "{refused}");
+    assert!(late.contains("false") && late.contains("time"), "{late}");
+    assert!(server.next(Duration::from_millis(50)).is_none());
+}
+
+#[test]
+fn slmpy_sends_frame_after_frame_in_one_connection() {
+    let server = Server::start(panel(), &settings(Duration::from_secs(20))).expect("server");
+    let mut stream = TcpStream::connect(server.slmpy().expect("address")).expect("connect");
+    let running = Panel::run(server);
+    let mut send = |bytes: &[u8]| {
+        stream.write_all(&(bytes.len() as i32).to_le_bytes()).expect("length");
+        stream.write_all(bytes).expect("frame");
+        let mut answer = [0; 4];
+        let read = stream.read(&mut answer).expect("answer");
+        String::from_utf8_lossy(&answer[..read]).into_owned()
+    };
+    assert_eq!(send(&zlib(&frame(1))), "done");
+    assert_eq!(send(&frame(2)), "done");
+    assert_eq!(send(&zlib(&frame(3)[1..])), "err");
+    assert_eq!(send(&zlib(&frame(4))), "done");
+    // A length that no frame has leaves no way to find the next one: the connection ends.
+    stream.write_all(&(-1i32).to_le_bytes()).expect("length");
+    let mut rest = Vec::new();
+    let _ = stream.read_to_end(&mut rest);
+    assert_eq!(rest, b"err");
+    let (server, shown) = running.end();
+    let wanted: Vec<Vec<u16>> = [1, 2, 4].map(|number| frame(number).into_iter().map(u16::from).collect()).into();
+    assert_eq!(shown.into_iter().map(|sent| sent.levels).collect::<Vec<_>>(), wanted);
+    assert_eq!(server.counts().refused, 2);
+}
+
+#[test]
+fn silent_clients_do_not_keep_others_out() {
+    let server = Server::start(panel(), &settings(Duration::from_secs(10))).expect("server");
+    let (slmsuite, slmpy) = (server.slmsuite().expect("address"), server.slmpy().expect("address"));
+    let running = Panel::run(server);
+    // Three times as many as may be connected, each with the beginning of a request.
+    let mut silent: Vec<TcpStream> = (0..48)
+        .map(|i| {
+            let mut stream = TcpStream::connect(if i % 2 == 0 { slmsuite } else { slmpy }).expect("connect");
+            let _ = stream.write_all(&request(&frame(0), HEIGHT)[..3]);
+            stream
+        })
+        .collect();
+    let start = Instant::now();
+    for number in 0..20 {
+        assert_eq!(ask(slmsuite, &request(&frame(number), HEIGHT)), SHOWN);
+    }
+    assert!(start.elapsed() < Duration::from_secs(8), "served only after the silent ones were given up");
+    silent.clear();
+    let (_, shown) = running.end();
+    assert_eq!(shown.len(), 20);
+}
+
+/// Resident memory of this process [bytes], where the system tells.
+fn resident() -> Option<u64> {
+    let pages = std::fs::read_to_string("/proc/self/statm").ok()?;
+    pages.split_whitespace().nth(1)?.parse::<u64>().ok().map(|pages| pages * 4096)
+}
+
+#[test]
+fn ten_thousand_requests_a_tenth_of_them_garbage() {
+    let server = Server::start(panel(), &settings(Duration::from_secs(10))).expect("server");
+    let (slmsuite, slmpy) = (server.slmsuite().expect("address"), server.slmpy().expect("address"));
+    let running = Panel::run(server);
+    let garbage = |number: u32| {
+        let whole = request(&frame(number), HEIGHT);
+        match number / 10 % 7 {
+            // Truncated, and the client goes.
+            0 => drop(TcpStream::connect(slmsuite).expect("connect").write_all(&whole[..whole.len() / 2])),
+            // Another shape.
+            1 => assert!(ask(slmsuite, &request(&frame(number)[WIDTH as usize..], HEIGHT - 1)).contains("shape")),
+            // Longer than any frame.
+            2 => assert!(ask(slmsuite, &vec![b'A'; 400_000]).contains("longer")),
+            // Not this protocol.
+            3 => assert!(ask(slmsuite, b"GET / HTTP/1.1\r\n\r\n").contains("false")),
+            // A length beyond all bounds.
+            4 => drop(TcpStream::connect(slmpy).expect("connect").write_all(&[0xFF, 0xFF, 0xFF, 0x7F])),
+            // A promised frame that does not come; the client stays silent and then goes.
+            5 => drop(TcpStream::connect(slmpy).expect("connect").write_all(&[0, 1, 0, 0, 1, 2, 3])),
+            // Nothing at all.
+            _ => drop(TcpStream::connect(slmsuite).expect("connect")),
+        }
+    };
+    let mut early = None;
+    let mut wanted = Vec::new();
+    for number in 0..10_000u32 {
+        if number % 10 == 9 {
+            garbage(number);
+        } else {
+            assert_eq!(ask(slmsuite, &request(&frame(number), HEIGHT)), SHOWN, "request {number}");
+            wanted.push(number);
+        }
+        if number == 2_000 {
+            early = resident();
+        }
+    }
+    let late = resident();
+    let (server, shown) = running.end();
+    assert_eq!(shown.len(), wanted.len(), "frames were lost or made up");
+    for (sent, number) in shown.iter().zip(wanted) {
+        assert!(sent.levels.iter().zip(frame(number)).all(|(level, byte)| *level == u16::from(byte)), "frame {number}");
+    }
+    assert_eq!(server.counts().frames, 9_000);
+    if let (Some(early), Some(late)) = (early, late) {
+        // The test itself keeps 7,200 frames of 1.5 kB from there on: 11 MB; ten more for the allocator.
+        assert!(late < early + 21_000_000, "memory grew by {} bytes", late - early);
+    }
+}
+
+#[test]
+fn the_server_ends_at_once_whoever_is_connected() {
+    let server = Server::start(panel(), &settings(Duration::from_secs(60))).expect("server");
+    let mut waiting = TcpStream::connect(server.slmpy().expect("address")).expect("connect");
+    std::thread::sleep(Duration::from_millis(100));
+    let start = Instant::now();
+    drop(server);
+    assert!(start.elapsed() < Duration::from_secs(5));
+    waiting.set_read_timeout(Some(Duration::from_secs(5))).expect("timeout");
+    assert!(matches!(waiting.read(&mut [0; 4]), Ok(0) | Err(_)));
+}
+
+#[test]
+fn a_taken_port_or_an_impossible_panel_is_refused() {
+    let first = Server::start(panel(), &settings(Duration::from_secs(1))).expect("server");
+    let taken = ServeSettings { slmsuite: first.slmsuite(), slmpy: None, ..ServeSettings::default() };
+    let message = Server::start(panel(), &taken).err().expect("taken").to_string();
+    assert!(message.contains("cannot listen"), "{message}");
+    assert!(Server::start(ServedPanel { bits: 17, ..panel() }, &settings(Duration::from_secs(1))).is_err());
+    let mute = ServeSettings { slmsuite: None, slmpy: None, ..ServeSettings::default() };
+    assert!(Server::start(panel(), &mute).is_err());
+}
