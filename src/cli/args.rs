@@ -1,6 +1,8 @@
 //! Flags as they are typed.
 
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use holodrive::encode::Encoding;
 use holodrive::units;
 use std::path::PathBuf;
 
@@ -178,9 +180,6 @@ pub(crate) enum ChannelArg {
 /// How the field is computed.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct HologramArgs {
-    /// Engine [default: the planner chooses].
-    #[arg(long = "engine", value_enum, value_name = "NAME")]
-    pub(crate) engine: Option<EngineArg>,
     /// Largest relative L2 error of the field.
     #[arg(long, default_value_t = 1e-3, value_name = "ERROR")]
     pub(crate) error: f64,
@@ -191,8 +190,14 @@ pub(crate) struct HologramArgs {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum EngineArg {
+    /// Double precision, term by term: slow, for tests.
     Oracle,
+    /// Vectorised sum to 1e-4.
     Direct,
+    /// Vectorised sum over tiles as large as the error allows.
+    Tiles,
+    /// Spectral wavefront recording planes.
+    Planes,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -237,6 +242,9 @@ pub(crate) struct ComputeArgs {
     pub(crate) light: SceneArgs,
     #[command(flatten)]
     pub(crate) placement: PlacementArgs,
+    /// Engine that computes the field [default: the planner chooses].
+    #[arg(long = "method", value_enum, value_name = "NAME")]
+    pub(crate) engine: Option<EngineArg>,
     #[command(flatten)]
     pub(crate) hologram: HologramArgs,
 }
@@ -274,19 +282,11 @@ pub(crate) struct PropagateArgs {
 #[derive(Clone, Debug, Args)]
 pub(crate) struct EncodingArgs {
     /// Encoding [default: double-phase on a phase panel, off-axis-bipolar on an amplitude panel].
-    #[arg(long = "method", value_enum, value_name = "NAME")]
-    pub(crate) encoding: Option<EncodingArg>,
+    #[arg(long = "method", value_parser = PossibleValuesParser::new(Encoding::NAMES), value_name = "NAME")]
+    pub(crate) encoding: Option<String>,
     /// Off-axis: angle of the reference wave, x or x,y.
     #[arg(long, value_parser = angles, value_name = "ANGLE[,ANGLE]", allow_hyphen_values = true)]
     pub(crate) reference_angle: Option<[f64; 2]>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum EncodingArg {
-    DoublePhase,
-    Kinoform,
-    OffAxisBipolar,
-    OffAxisIntensity,
 }
 
 #[derive(Debug, Args)]
@@ -383,6 +383,9 @@ pub(crate) struct ShowArgs {
     pub(crate) light: SceneArgs,
     #[command(flatten)]
     pub(crate) placement: PlacementArgs,
+    /// Engine that computes the field [default: the planner chooses].
+    #[arg(long, value_enum, value_name = "NAME")]
+    pub(crate) engine: Option<EngineArg>,
     #[command(flatten)]
     pub(crate) hologram: HologramArgs,
     #[command(flatten)]

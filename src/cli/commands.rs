@@ -1,14 +1,14 @@
 //! The steps, one by one.
 
 use super::args::{
-    ChannelArg, ComputeArgs, DepthArg, EncodeArgs, EncodingArg, EncodingArgs, EngineArg, FormFactorArg, FrameArg,
-    HologramArgs, KernelArg, MonitorsArgs, PanelArgs, PhaseArg, PlacementArg, PlacementArgs, PointsArgs, PropagateArgs,
+    ChannelArg, ComputeArgs, DepthArg, EncodeArgs, EncodingArgs, EngineArg, FormFactorArg, FrameArg, HologramArgs,
+    KernelArg, MonitorsArgs, PanelArgs, PhaseArg, PlacementArg, PlacementArgs, PointsArgs, PropagateArgs,
     ReconstructArgs, SceneArgs, White,
 };
 use super::bar::Bar;
 use super::report::{Report, count, seconds};
 use glam::DVec2;
-use holodrive::encode::{DoublePhase, EncodeSettings, Encoding, OffAxis, Reference};
+use holodrive::encode::{EncodeSettings, Encoding, Reference};
 use holodrive::field::{Field, Grid, npy};
 use holodrive::hologram::{Computed, HologramSettings, Method};
 use holodrive::illumination::{FormFactor, IlluminationSettings};
@@ -92,12 +92,14 @@ fn placed_by(args: &PlacementArgs) -> Placement {
     }
 }
 
-pub(super) fn hologram_settings(args: &HologramArgs) -> HologramSettings {
+pub(super) fn hologram_settings(args: &HologramArgs, engine: Option<EngineArg>) -> HologramSettings {
     HologramSettings {
         error: args.error,
-        method: args.engine.map(|engine| match engine {
+        method: engine.map(|engine| match engine {
             EngineArg::Oracle => Method::Oracle,
             EngineArg::Direct => Method::Direct,
+            EngineArg::Tiles => Method::Tiles,
+            EngineArg::Planes => Method::Planes,
         }),
         ..HologramSettings::default()
     }
@@ -364,7 +366,7 @@ pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
     let bar = Bar::new();
     let source = input(&args.input)?;
     let points = load_points(&source, (&args.light, &args.placement, White::Auto), &panel, &bar.progress, &mut report)?;
-    let settings = hologram_settings(&args.hologram);
+    let settings = hologram_settings(&args.hologram, args.engine);
     let channel = channel(&args.hologram);
     let computed = pipeline::field(&points.cloud, channel, &panel.grid, panel.wavelength, &settings, &bar.progress)?;
     report_field(&computed, &mut report);
@@ -419,21 +421,22 @@ pub(super) fn propagate(args: &PropagateArgs) -> Result<Report> {
 
 /// Encoding settings for a kind of panel.
 pub(super) fn encode_settings(args: &EncodingArgs, panel: &Panel) -> Result<EncodeSettings> {
-    let chosen = args.encoding.unwrap_or(match panel.profile.modulation() {
-        Modulation::Amplitude => EncodingArg::OffAxisBipolar,
-        Modulation::Phase => EncodingArg::DoublePhase,
+    let chosen = args.encoding.as_deref().unwrap_or(match panel.profile.modulation() {
+        Modulation::Amplitude => "off-axis-bipolar",
+        Modulation::Phase => "double-phase",
     });
-    let off_axis = OffAxis { reference: args.reference_angle.map(Reference::Angle), ..OffAxis::default() };
-    let encoding = match chosen {
-        EncodingArg::DoublePhase => Encoding::DoublePhase(DoublePhase::default()),
-        EncodingArg::Kinoform => Encoding::Kinoform,
-        EncodingArg::OffAxisBipolar => Encoding::OffAxisBipolar(off_axis),
-        EncodingArg::OffAxisIntensity => Encoding::OffAxisIntensity(off_axis),
-    };
-    let off = matches!(encoding, Encoding::OffAxisBipolar(_) | Encoding::OffAxisIntensity(_));
-    if args.reference_angle.is_some() && !off {
-        let what = format!("{} has no reference wave; leave --reference-angle out", encoding.name());
-        return Err(Error::parameter("reference-angle", what));
+    let mut encoding = Encoding::named(chosen)?;
+    if let Some(angles) = args.reference_angle {
+        match &mut encoding {
+            Encoding::OffAxisBipolar(fringe) | Encoding::OffAxisIntensity(fringe) => {
+                fringe.reference = Some(Reference::Angle(angles));
+            }
+            Encoding::Binary(binary) => binary.fringe.reference = Some(Reference::Angle(angles)),
+            _ => {
+                let what = format!("{chosen} has no reference wave to turn; leave --reference-angle out");
+                return Err(Error::parameter("reference-angle", what));
+            }
+        }
     }
     Ok(EncodeSettings::new(encoding))
 }

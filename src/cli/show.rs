@@ -72,7 +72,7 @@ fn run(args: &ShowArgs) -> Result<Report> {
             let points =
                 load_points(&source, (&args.light, &args.placement, White::Auto), &panel, &bar.progress, &mut report)?;
             write_points(out, &points, &mut report)?;
-            let settings = hologram_settings(&args.hologram);
+            let settings = hologram_settings(&args.hologram, args.engine);
             let computed = pipeline::field(
                 &points.cloud,
                 channel(&args.hologram),

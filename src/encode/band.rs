@@ -1,5 +1,6 @@
 //! Limiting a field to a window of spatial frequencies.
 
+use crate::error::{Error, Result};
 use crate::field::{Complex32, Fft2, Field};
 use crate::propagation::Aperture;
 
@@ -27,4 +28,20 @@ pub fn limit(field: &Field, aperture: &Aperture) -> (Field, f64) {
 pub(super) fn centered(field: &Field, share: [f64; 2]) -> Aperture {
     let slack = 1.0 + 1e-9;
     Aperture::centered(field.grid.limit_x() * share[0] * slack, field.grid.limit_y() * share[1] * slack)
+}
+
+/// A centred window of shares above 0 and at most 1 of the grid's limits.
+pub(super) fn of_share(field: &Field, share: [f64; 2]) -> Result<Aperture> {
+    match share.iter().find(|share| !(**share > 0.0 && **share <= 1.0)) {
+        Some(share) => Err(Error::parameter("band", format!("{share} must be above 0 and at most 1"))),
+        None => Ok(centered(field, share)),
+    }
+}
+
+/// The warning that is due when much of the light was dropped.
+pub(super) fn lost(dropped: f64) -> Vec<String> {
+    if dropped <= 0.1 {
+        return Vec::new();
+    }
+    vec![format!("{:.0} % of the light lies outside the encoding's band and is lost", 100.0 * dropped)]
 }

@@ -59,10 +59,7 @@ pub const PERCENTILES: [f64; 6] = [0.8, 0.9, 0.95, 0.99, 0.999, 1.0];
 const TRIAL: usize = 512;
 
 pub(super) fn pattern(field: &Field, settings: &DoublePhase, progress: &Progress) -> Result<EncodedPattern> {
-    if let Some(share) = settings.band.iter().find(|share| !(**share > 0.0 && **share <= 1.0)) {
-        return Err(Error::parameter("band", format!("{share} must be above 0 and at most 1")));
-    }
-    let aperture = band::centered(field, settings.band);
+    let aperture = band::of_share(field, settings.band)?;
     let (target, dropped) = band::limit(field, &aperture);
     progress.advance(1);
     progress.check()?;
@@ -80,7 +77,7 @@ pub(super) fn pattern(field: &Field, settings: &DoublePhase, progress: &Progress
     let clipped =
         target.samples.iter().filter(|u| u.norm() > greatest * (1.0 + 1e-6)).count() as f64 / phase.len() as f64;
     progress.advance(1);
-    let mut warnings = Vec::new();
+    let mut warnings = band::lost(dropped);
     let [along_x, along_y] = settings.band.map(|share| share <= 0.5);
     let apart = match settings.interlace {
         Interlace::Checkerboard => along_x || along_y,
@@ -89,9 +86,6 @@ pub(super) fn pattern(field: &Field, settings: &DoublePhase, progress: &Progress
     };
     if !apart {
         warnings.push("the band is wider than half the panel's: conjugate orders overlap the object".into());
-    }
-    if dropped > 0.1 {
-        warnings.push(format!("{:.0} % of the light lies outside the encoding's band and is lost", 100.0 * dropped));
     }
     let parameters = BTreeMap::from([
         ("interlace".to_owned(), serde_json::json!(settings.interlace)),
@@ -137,7 +131,7 @@ fn best_percentile(target: &Field, settings: &DoublePhase) -> Result<f64> {
     let samples =
         (0..middle.len()).map(|i| target.samples[(top + i / width) * grid.width + left + i % width]).collect();
     let cut = Field::new(middle, target.wavelength, samples)?;
-    let aperture = band::centered(&cut, settings.band);
+    let aperture = band::of_share(&cut, settings.band)?;
     let (wanted, _) = band::limit(&cut, &aperture);
     let mut best = (f64::INFINITY, PERCENTILES[0]);
     for percentile in PERCENTILES {

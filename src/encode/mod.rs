@@ -10,13 +10,30 @@
 //! | [`Encoding::Kinoform`] | phase | all | mean of \|u\| squared over mean of \|u\|² |
 //! | [`Encoding::OffAxisBipolar`] | amplitude | half the panel's along the carrier | 1/16 |
 //! | [`Encoding::OffAxisIntensity`] | amplitude | a quarter of the panel's along the carrier | 1/16 |
+//! | [`Encoding::SingleSideBand`] | amplitude | the upper half of the panel's | 1/16 |
+//! | [`Encoding::ErrorDiffusion`] | phase | half the panel's by default | as double phase |
+//! | [`Encoding::Gradient`] | phase | half the panel's by default | what the best fit takes |
+//! | [`Encoding::GerchbergSaxton`] | phase | all | nearly all |
+//! | [`Encoding::Cells`] | amplitude | a third or a quarter along x | 1/12 (Burckhardt), 1/16 (Lee) |
+//! | [`Encoding::Binary`] | amplitude, 1 bit | half the panel's along the carrier | 1/π² by threshold |
+//!
+//! The iterative ones are also functions of their own, for targets that are pictures: [`iterative`].
 
 pub mod band;
+pub mod binary;
+pub mod cells;
 pub mod double_phase;
+pub mod error_diffusion;
+mod iterated;
+pub mod iterative;
 pub mod kinoform;
 pub mod off_axis;
 
+pub use binary::{Binarisation, BinaryFringe};
+pub use cells::{Cell, CellHologram};
 pub use double_phase::{DoublePhase, Interlace};
+pub use error_diffusion::ErrorDiffusion;
+pub use iterated::{BandGradient, PlaneProjections};
 pub use off_axis::{OffAxis, Reference};
 
 use crate::error::{Error, Result};
@@ -37,44 +54,94 @@ pub enum Encoding {
     OffAxisBipolar(OffAxis),
     /// Interference of object and oblique reference as a plate records it, |u + r|².
     OffAxisIntensity(OffAxis),
+    /// Real part of the object's upper half of the band, raised to be positive: Bryngdahl & Lohmann 1968.
+    SingleSideBand(OffAxis),
+    /// Phase alone, the error of each pixel handed on to its neighbours: Tsang & Poon 2013.
+    ErrorDiffusion(ErrorDiffusion),
+    /// Phases found by gradient descent, so that the field within a band comes out as a complex field.
+    Gradient(BandGradient),
+    /// Phases found by projections between planes on which the field's amplitudes should stand.
+    GerchbergSaxton(PlaneProjections),
+    /// Amplitudes of neighbouring columns whose light has different phases along the carrier.
+    Cells(CellHologram),
+    /// Fringes of two amplitudes.
+    Binary(BinaryFringe),
 }
 
 impl Encoding {
     /// Names as the command line and metadata write them.
-    pub const NAMES: [&'static str; 4] = ["double-phase", "kinoform", "off-axis-bipolar", "off-axis-intensity"];
+    pub const NAMES: [&'static str; 13] = [
+        "double-phase",
+        "kinoform",
+        "off-axis-bipolar",
+        "off-axis-intensity",
+        "single-side-band",
+        "error-diffusion",
+        "gradient",
+        "gerchberg-saxton",
+        "burckhardt",
+        "lee",
+        "binary-threshold",
+        "binary-diffusion",
+        "binary-search",
+    ];
 
     /// The encoding of that name with its default settings.
     ///
     /// # Errors
     /// [`Error::Parameter`] that lists the names.
     pub fn named(name: &str) -> Result<Self> {
-        match name {
-            "double-phase" => Ok(Self::DoublePhase(DoublePhase::default())),
-            "kinoform" => Ok(Self::Kinoform),
-            "off-axis-bipolar" => Ok(Self::OffAxisBipolar(OffAxis::default())),
-            "off-axis-intensity" => Ok(Self::OffAxisIntensity(OffAxis::default())),
+        let binary = |method| Self::Binary(BinaryFringe::new(method));
+        Ok(match name {
+            "double-phase" => Self::DoublePhase(DoublePhase::default()),
+            "kinoform" => Self::Kinoform,
+            "off-axis-bipolar" => Self::OffAxisBipolar(OffAxis::default()),
+            "off-axis-intensity" => Self::OffAxisIntensity(OffAxis::default()),
+            "single-side-band" => Self::SingleSideBand(OffAxis::default()),
+            "error-diffusion" => Self::ErrorDiffusion(ErrorDiffusion::default()),
+            "gradient" => Self::Gradient(BandGradient::default()),
+            "gerchberg-saxton" => Self::GerchbergSaxton(PlaneProjections::default()),
+            "burckhardt" => Self::Cells(CellHologram { cell: Cell::Burckhardt, percentile: 0.999 }),
+            "lee" => Self::Cells(CellHologram { cell: Cell::Lee, percentile: 0.999 }),
+            "binary-threshold" => binary(Binarisation::Threshold),
+            "binary-diffusion" => binary(Binarisation::ErrorDiffusion),
+            "binary-search" => binary(Binarisation::DirectSearch { sweeps: 5 }),
             _ => {
                 let what = format!("`{name}` is no encoding; use one of {}", Self::NAMES.join(", "));
-                Err(Error::parameter("method", what))
+                return Err(Error::parameter("method", what));
             }
-        }
+        })
     }
 
     /// Its name.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::DoublePhase(_) => Self::NAMES[0],
-            Self::Kinoform => Self::NAMES[1],
-            Self::OffAxisBipolar(_) => Self::NAMES[2],
-            Self::OffAxisIntensity(_) => Self::NAMES[3],
+            Self::DoublePhase(_) => "double-phase",
+            Self::Kinoform => "kinoform",
+            Self::OffAxisBipolar(_) => "off-axis-bipolar",
+            Self::OffAxisIntensity(_) => "off-axis-intensity",
+            Self::SingleSideBand(_) => "single-side-band",
+            Self::ErrorDiffusion(_) => "error-diffusion",
+            Self::Gradient(_) => "gradient",
+            Self::GerchbergSaxton(_) => "gerchberg-saxton",
+            Self::Cells(settings) => settings.cell.name(),
+            Self::Binary(settings) => settings.method.name(),
         }
     }
 
     /// What its pattern modulates.
     pub fn modulation(&self) -> Modulation {
         match self {
-            Self::DoublePhase(_) | Self::Kinoform => Modulation::Phase,
-            Self::OffAxisBipolar(_) | Self::OffAxisIntensity(_) => Modulation::Amplitude,
+            Self::DoublePhase(_)
+            | Self::Kinoform
+            | Self::ErrorDiffusion(_)
+            | Self::Gradient(_)
+            | Self::GerchbergSaxton(_) => Modulation::Phase,
+            Self::OffAxisBipolar(_)
+            | Self::OffAxisIntensity(_)
+            | Self::SingleSideBand(_)
+            | Self::Cells(_)
+            | Self::Binary(_) => Modulation::Amplitude,
         }
     }
 }
@@ -182,7 +249,7 @@ pub fn encode(
     let profile = amplitude.as_ref().unwrap_or(profile);
     let grid = profile.grid()?;
     crate::panel::drive::fit(field.grid, profile)?;
-    let made = pattern(field, encoding, progress)?;
+    let made = pattern(field, encoding, profile, progress)?;
     progress.start("drive levels", grid.height as u64);
     let mut driven = drive(&made.pattern, settings.correction.as_ref(), profile)?;
     warnings.extend(made.warnings);
@@ -207,11 +274,20 @@ pub fn encode(
     Ok(Encoded { frame, report })
 }
 
-/// Encodes a field without a panel: the pattern as real numbers, for prints and for whoever drives a panel otherwise.
+/// The pattern of an encoding before it meets the panel's levels, with the field that it stands for.
+///
+/// Only error diffusion and the iterations look at the profile's levels here, because their later pixels or steps make
+/// up for what the earlier could not show.
 ///
 /// # Errors
-/// As [`encode`], without those about the panel.
-pub fn pattern(field: &Field, encoding: &Encoding, progress: &Progress) -> Result<EncodedPattern> {
+/// As [`encode`].
+pub fn pattern(
+    field: &Field,
+    encoding: &Encoding,
+    profile: &PanelProfile,
+    progress: &Progress,
+) -> Result<EncodedPattern> {
+    use off_axis::Fringe;
     if let Some(i) = field.samples.iter().position(|u| !u.is_finite()) {
         let (column, row) = (i % field.grid.width, i / field.grid.width);
         return Err(Error::parameter("field", format!("the sample at column {column}, row {row} is not finite")));
@@ -223,10 +299,17 @@ pub fn pattern(field: &Field, encoding: &Encoding, progress: &Progress) -> Resul
     match encoding {
         Encoding::DoublePhase(settings) => double_phase::pattern(field, settings, progress),
         Encoding::Kinoform => kinoform::pattern(field),
-        Encoding::OffAxisBipolar(settings) => off_axis::pattern(field, settings, off_axis::Fringe::Bipolar, progress),
-        Encoding::OffAxisIntensity(settings) => {
-            off_axis::pattern(field, settings, off_axis::Fringe::Intensity, progress)
+        Encoding::OffAxisBipolar(settings) => off_axis::pattern(field, settings, Fringe::Bipolar, progress),
+        Encoding::OffAxisIntensity(settings) => off_axis::pattern(field, settings, Fringe::Intensity, progress),
+        Encoding::SingleSideBand(settings) => off_axis::pattern(field, settings, Fringe::SingleSideBand, progress),
+        Encoding::ErrorDiffusion(settings) => {
+            let curve = profile.drive_curve(field.wavelength)?.0;
+            error_diffusion::pattern(field, settings, &curve, progress)
         }
+        Encoding::Gradient(settings) => iterated::gradient(field, settings, profile, progress),
+        Encoding::GerchbergSaxton(settings) => iterated::projections(field, settings, profile, progress),
+        Encoding::Cells(settings) => cells::pattern(field, settings, progress),
+        Encoding::Binary(settings) => binary::pattern(field, settings, progress),
     }
 }
 

@@ -1,5 +1,8 @@
 //! Amplitude fringes of the object u with an oblique plane reference r = exp(i2πf_r·x).
 //!
+//! *Single side band* (Bryngdahl & Lohmann, *J. Opt. Soc. Am.* 58, 620 (1968)): the bipolar fringe with the reference on
+//! the axis, of an object that has light in the upper half of the band only; the conjugate lies in the lower half.
+//!
 //! *Bipolar*: t = ½(1 + Re(u·r*)/A), after Lucente: the interference term alone. *Intensity*: t = |u + ρ·r|²/I, as a
 //! plate would record it, with the object's own |u|². Lit with r the panel gives back the object where it was,
 //!
@@ -50,6 +53,8 @@ pub struct OffAxis {
     pub reference: Option<Reference>,
     /// Half width of the object's band along the carrier [cycles/m]; absent: the widest that keeps the orders apart.
     pub bandwidth: Option<f64>,
+    /// Half width of the object's band across the carrier, as share of the panel's limit, 0 … 1.
+    pub across: f64,
     /// The amplitude that uses the full contrast is the one below which this share of the samples lies.
     pub percentile: f64,
     /// Amplitude of the reference over that of the object, ρ/A (intensity only).
@@ -58,15 +63,26 @@ pub struct OffAxis {
 
 impl Default for OffAxis {
     fn default() -> Self {
-        Self { reference: None, bandwidth: None, percentile: 0.999, reference_ratio: 1.0 }
+        Self { reference: None, bandwidth: None, across: 1.0, percentile: 0.999, reference_ratio: 1.0 }
     }
 }
 
-/// The two kinds of fringe.
+impl Fringe {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Bipolar => "off-axis-bipolar",
+            Self::Intensity => "off-axis-intensity",
+            Self::SingleSideBand => "single-side-band",
+        }
+    }
+}
+
+/// The kinds of fringe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fringe {
     Bipolar,
     Intensity,
+    SingleSideBand,
 }
 
 /// Carrier and band that keep the orders apart on a grid.
@@ -85,9 +101,18 @@ const GUARD: f64 = 0.95;
 fn layout(field: &Field, settings: &OffAxis, fringe: Fringe) -> Result<Layout> {
     let grid = field.grid;
     let limits = [grid.limit_x(), grid.limit_y()];
+    if fringe == Fringe::SingleSideBand {
+        if settings.reference.is_some() || settings.bandwidth.is_some() {
+            let what = "a single side band has its reference on the axis and half the panel's band; leave it out";
+            return Err(Error::parameter("reference", what));
+        }
+        let middle = [0.0, 0.5 * limits[1]];
+        let half = [limits[0] * settings.across * (1.0 + 1e-9), GUARD * 0.5 * limits[1]];
+        return Ok(Layout { carrier: [0.0; 2], band: Aperture { center: middle, half, stop: 0.0 }, warnings: vec![] });
+    }
     let pitches = [grid.pitch_x, grid.pitch_y];
     // Half widths of the object that fit between carrier and zero order.
-    let separation = if fringe == Fringe::Bipolar { 1.0 } else { 3.0 };
+    let separation = if fringe == Fringe::Intensity { 3.0 } else { 1.0 };
     let carrier = match settings.reference {
         Some(reference) => reference.frequency(field.wavelength),
         None => [limits[0] * separation / (1.0 + separation), 0.0],
@@ -148,9 +173,9 @@ fn layout(field: &Field, settings: &OffAxis, fringe: Fringe) -> Result<Layout> {
             GUARD * (limit - along).min(along / separation)
         }
     };
-    let mut share = [1.0; 2];
+    let mut share = [settings.across; 2];
     share[axis] = half / limit;
-    Ok(Layout { carrier, band: band::centered(field, share), warnings })
+    Ok(Layout { carrier, band: band::of_share(field, share)?, warnings })
 }
 
 pub(super) fn pattern(
@@ -179,7 +204,7 @@ pub(super) fn pattern(
     let mut reference = vec![Complex32::new(1.0, 0.0); target.samples.len()];
     illuminate(&mut reference, field.grid, field.wavelength, illumination)?;
     let (brightest, scale) = match fringe {
-        Fringe::Bipolar => (amplitude, 0.25 / f64::from(amplitude)),
+        Fringe::Bipolar | Fringe::SingleSideBand => (amplitude, 0.25 / f64::from(amplitude)),
         Fringe::Intensity => {
             let rho = f64::from(amplitude) * ratio;
             let brightest = (f64::from(amplitude) + rho).powi(2);
@@ -188,7 +213,7 @@ pub(super) fn pattern(
     };
     let rho = amplitude * ratio as f32;
     let raw = |u: &Complex32, r: &Complex32| match fringe {
-        Fringe::Bipolar => 0.5 + 0.5 * (u * r.conj()).re / brightest,
+        Fringe::Bipolar | Fringe::SingleSideBand => 0.5 + 0.5 * (u * r.conj()).re / brightest,
         Fringe::Intensity => (u + r * rho).norm_sqr() / brightest,
     };
     let transmittance = target.samples.par_iter().zip(&reference).map(|(u, r)| raw(u, r).clamp(0.0, 1.0)).collect();
@@ -207,7 +232,7 @@ pub(super) fn pattern(
         parameters.insert("reference_ratio".to_owned(), json!(ratio));
     }
     let record = EncodingRecord {
-        method: if fringe == Fringe::Bipolar { "off-axis-bipolar" } else { "off-axis-intensity" }.into(),
+        method: fringe.name().into(),
         modulation: Modulation::Amplitude,
         parameters,
         illumination,

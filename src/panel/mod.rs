@@ -8,6 +8,7 @@
 //!
 //! What has been done stands in the frame's metadata ([`frame::Applied`]), so that nothing is done twice.
 
+pub mod calibration;
 pub mod drive;
 pub mod frame;
 mod frame_file;
@@ -16,6 +17,7 @@ pub mod profile;
 mod profile_file;
 pub mod response;
 pub mod simulated;
+pub mod vendor;
 pub mod wavefront;
 
 pub use drive::{Driven, Pattern, correct, drive};

@@ -1,0 +1,86 @@
+//! Derivatives against finite differences; pictures on one and on three planes on a panel of real levels.
+
+use super::gradient::{gradient_field, slope};
+use super::*;
+use crate::progress::Progress;
+use std::path::Path;
+
+const WAVELENGTH: f64 = 532e-9;
+
+fn panel(width: usize, height: usize, levels_for_2pi: f64) -> PanelProfile {
+    let text = format!(
+        "name = \"t\"\nmaker = \"t\"\nkind = \"phase-lcos\"\nwidth = {width}\nheight = {height}\npitch = \"8um\"\nbits = 8\n\
+         fill_factor = 1.0\nwavelengths = [\"532nm\"]\n[[response]]\nkind = \"linear\"\nlevels_for_2pi = {levels_for_2pi}\n"
+    );
+    PanelProfile::parse(&text, Path::new("t.toml")).expect("profile")
+}
+
+/// A picture of soft and hard edges within `columns` and the middle rows, which alone count.
+fn picture(grid: Grid, z: f64, columns: std::ops::Range<usize>, seed: f32) -> TargetPlane {
+    let rows = grid.height / 8..grid.height - grid.height / 8;
+    let inside = |i: usize| columns.contains(&(i % grid.width)) && rows.contains(&(i / grid.width));
+    let value = |i: usize| {
+        let (x, y) = ((i % grid.width) as f32, (i / grid.width) as f32);
+        let wave = 0.5 + 0.3 * (0.11 * x + seed).sin() * (0.13 * y - 0.7 * seed).cos();
+        if (x as usize / 12 + y as usize / 12) % 3 == 0 { 1.0 } else { wave }
+    };
+    let amplitude = (0..grid.len()).map(|i| if inside(i) { value(i) } else { 0.0 }).collect();
+    let weight = (0..grid.len()).map(|i| if inside(i) { 1.0 } else { 0.0 }).collect();
+    TargetPlane { z, amplitude, weight: Some(weight) }
+}
+
+#[test]
+fn analytic_slopes_equal_finite_differences() {
+    let profile = panel(24, 18, 256.0);
+    let grid = profile.grid().expect("grid");
+    let mut random = Random::new(4, 0);
+    let wanted = (0..grid.len()).map(|_| random.uniform_f32()).collect();
+    let weight = Some((0..grid.len()).map(|_| random.uniform_f32()).collect());
+    let planes = vec![
+        TargetPlane { z: 0.002, amplitude: wanted, weight },
+        TargetPlane { z: -0.001, ..picture(grid, 0.0, 3..20, 1.0) },
+    ];
+    let field = (0..grid.len()).map(|_| Complex32::new(random.uniform_f32(), random.uniform_f32())).collect();
+    let half = [0.6 * grid.limit_x(), 0.8 * grid.limit_y()];
+    for target in [Target::Amplitude(planes), Target::Complex { samples: field, half }] {
+        let problem = Problem::new(&target, grid, WAVELENGTH, Padding::Dark).expect("problem");
+        let phase = Start::Random { seed: 9 }.phases(grid, WAVELENGTH).expect("phases");
+        let light = |phase: &[f32]| phase.iter().map(|&p| Complex32::from_polar(1.0, p)).collect::<Vec<_>>();
+        let panel = light(&phase);
+        let pulled = gradient_field(&problem, &problem.judge(&panel));
+        // Along the slopes themselves, each weighted at random, so that the difference stands well above the rounding of
+        // single precision; five-point differences have an error of order h⁴.
+        let slopes: Vec<f32> = pulled.iter().zip(&panel).map(|(g, u)| slope(*g, *u)).collect();
+        let steepest = slopes.iter().fold(0.0, |a: f32, s| a.max(s.abs()));
+        let direction: Vec<f32> = slopes.iter().map(|s| s / steepest * 2.0 * random.uniform_f32()).collect();
+        let moved = |h: f32| {
+            let phase: Vec<f32> = phase.iter().zip(&direction).map(|(p, d)| p + h * d).collect();
+            problem.judge(&light(&phase)).error
+        };
+        let h = 2e-2f32;
+        let measured = (8.0 * (moved(h) - moved(-h)) - (moved(2.0 * h) - moved(-2.0 * h))) / (12.0 * f64::from(h));
+        let analytic: f64 = slopes.iter().zip(&direction).map(|(s, d)| f64::from(*s) * f64::from(*d)).sum();
+        assert!((measured / analytic - 1.0).abs() < 1e-4, "{measured} {analytic}");
+    }
+}
+
+#[test]
+fn one_plane_passes_35_and_three_planes_30_decibel_on_eight_bits() {
+    let profile = panel(192, 144, 256.0);
+    let grid = profile.grid().expect("grid");
+    let flat = Target::Amplitude(vec![picture(grid, 0.02, 24..168, 0.0)]);
+    let deep = Target::Amplitude(vec![
+        picture(grid, 0.015, 24..68, 0.0),
+        picture(grid, 0.02, 74..118, 1.0),
+        picture(grid, 0.025, 124..168, 2.0),
+    ]);
+    let descent = GradientDescent { iterations: 300, ..GradientDescent::default() };
+    for (target, least) in [(&flat, 35.0), (&deep, 30.0)] {
+        let found = gradient_descent(target, &profile, WAVELENGTH, &descent, &Progress::new()).expect("descent");
+        assert!(found.psnr.iter().all(|&p| p > least), "{:?}", found.psnr);
+        let projections = GerchbergSaxton { iterations: 300, ..GerchbergSaxton::default() };
+        let found =
+            gerchberg_saxton(target, &profile, WAVELENGTH, &projections, &Progress::new()).expect("projections");
+        assert!(found.psnr.iter().all(|&p| p > least), "{:?}", found.psnr);
+    }
+}

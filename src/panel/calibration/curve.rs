@@ -1,0 +1,291 @@
+//! The level → phase curve from a sweep of two-level gratings.
+//!
+//! Stripes of a fixed level and of level L alternate, equally wide. The zero order of that grating has the power
+//! P = B + A·cos²(Δ/2), its first orders P = B + A·sin²(Δ/2), Δ = φ(L) − φ(fixed): B is stray light and what the dead space
+//! sends, A the laser's power. The curve is a polynomial of the level; it, A and B are fitted to all powers together
+//! (Levenberg & Marquardt), starting from the phases that the maxima and minima of the sweep tell.
+
+use crate::error::{Error, Result};
+use crate::panel::{Curve, Frame, PanelProfile};
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+
+/// Which order the detector saw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// The undiffracted light: brightest where the levels agree.
+    Zero,
+    /// A first order: dark where the levels agree.
+    First,
+}
+
+/// A fitted curve.
+#[derive(Clone, Debug)]
+pub struct CurveFit {
+    /// Polynomial of the phase [rad], zero at level 0.
+    pub curve: Curve,
+    /// Standard deviation of the phase at each level [rad], from the scatter of the powers about the fit.
+    pub uncertainty: Vec<f64>,
+    /// Root mean square of measured − fitted power, as share of A.
+    pub residual: f64,
+    /// Range of the curve [rad].
+    pub range: f64,
+}
+
+/// The grating to show: stripes of `stripe` columns at level `fixed` and at `level`.
+///
+/// # Errors
+/// [`Error::Parameter`] for levels that the panel does not have, or stripes without width.
+pub fn sweep_frame(profile: &PanelProfile, wavelength: f64, fixed: u16, level: u16, stripe: usize) -> Result<Frame> {
+    if stripe == 0 {
+        return Err(Error::parameter("stripe", "0 columns; take at least one, a few against crosstalk"));
+    }
+    let row: Vec<u16> = (0..profile.width).map(|x| if x / stripe % 2 == 0 { fixed } else { level }).collect();
+    let mut frame = Frame::new(profile, wavelength, row.repeat(profile.height))?;
+    frame.metadata.origin.notes = vec![format!("calibration grating: levels {fixed} and {level}, stripes of {stripe}")];
+    Ok(frame)
+}
+
+/// Reads measured powers: lines `level,power` (a head line and lines that begin with `#` are passed over).
+///
+/// # Errors
+/// [`Error::Calibration`] with the line that is not two numbers, or whose level the panel does not have.
+pub fn read_powers(path: &Path, levels: usize) -> Result<Vec<(u16, f64)>> {
+    let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
+    let mut powers = Vec::new();
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let words: Vec<&str> = line.split([',', ';', '\t']).map(str::trim).collect();
+        let pair = match words[..] {
+            [level, power] => level.parse::<u16>().ok().zip(power.parse::<f64>().ok().filter(|p| p.is_finite())),
+            _ => None,
+        };
+        match pair {
+            Some((level, power)) if usize::from(level) < levels => powers.push((level, power)),
+            Some((level, _)) => {
+                let what = format!("line {}: level {level}; the panel has 0 … {}", number + 1, levels - 1);
+                return Err(Error::calibration(path, what));
+            }
+            None if powers.is_empty() && line.starts_with(char::is_alphabetic) => {}
+            None => {
+                let what = format!("line {}: `{line}` is not a level and a power", number + 1);
+                return Err(Error::calibration(path, what));
+            }
+        }
+    }
+    Ok(powers)
+}
+
+/// Fits the curve of a panel with `levels` levels to the powers of a sweep against level 0.
+///
+/// `degree` is that of the polynomial: 5 follows a liquid crystal.
+///
+/// # Errors
+/// [`Error::Calibration`] (for `source`) when there are too few powers, the sweep shows no modulation, or the fitted
+/// curve turns back: then the sweep is too noisy or the degree too high.
+pub fn fit_curve(powers: &[(u16, f64)], levels: usize, order: Order, degree: usize, source: &Path) -> Result<CurveFit> {
+    let refuse = |what: String| Err(Error::calibration(source, what));
+    if !(1..=9).contains(&degree) {
+        return Err(Error::parameter("degree", format!("{degree} must be 1 … 9")));
+    }
+    if powers.len() < 4 * (degree + 2) {
+        let what = format!("{} powers; a fit of degree {degree} needs {} or more", powers.len(), 4 * (degree + 2));
+        return refuse(what);
+    }
+    let mut powers = powers.to_vec();
+    powers.sort_by_key(|p| p.0);
+    let full = (levels.max(2) - 1) as f64;
+    let x: Vec<f64> = powers.iter().map(|p| f64::from(p.0) / full).collect();
+    // As a first order: dark where the levels agree.
+    let turned = if order == Order::Zero { -1.0 } else { 1.0 };
+    let y: Vec<f64> = powers.iter().map(|p| p.1 * turned).collect();
+    let start = starting_phases(&x, &y).ok_or_else(|| {
+        Error::calibration(source, "the powers show no modulation; check detector, order and grating")
+    })?;
+    let mut parameters = polynomial(&x, &start, degree);
+    let (low, high) = bounds(&smoothed(&y));
+    parameters.extend([high - low, low]);
+    let covariance = refine(&x, &y, &mut parameters, degree)
+        .ok_or_else(|| Error::calibration(source, "the fit does not converge; take more levels or a lower degree"))?;
+    let (amplitude, offset) = (parameters[degree], parameters[degree + 1]);
+    let model = |x: f64| offset + amplitude * (0.5 * phase_at(&parameters[..degree], x)).sin().powi(2);
+    let squares: f64 = x.iter().zip(&y).map(|(&x, &y)| (y - model(x)).powi(2)).sum();
+    let variance = squares / (x.len() - degree - 2) as f64;
+    let uncertainty = (0..levels)
+        .map(|level| {
+            let x = level as f64 / full;
+            let slopes: Vec<f64> = (1..=degree).map(|i| x.powi(i as i32)).collect();
+            let sum: f64 = (0..degree)
+                .flat_map(|i| (0..degree).map(move |j| (i, j)))
+                .map(|(i, j)| slopes[i] * covariance[i][j] * slopes[j])
+                .sum();
+            (variance * sum).max(0.0).sqrt()
+        })
+        .collect();
+    let coefficients = std::iter::once(0.0).chain(parameters[..degree].iter().copied()).collect();
+    let curve = Curve::Polynomial { coefficients };
+    curve.check(levels, source)?;
+    let range = phase_at(&parameters[..degree], 1.0).abs();
+    Ok(CurveFit { curve, uncertainty, residual: (squares / x.len() as f64).sqrt() / amplitude.abs(), range })
+}
+
+/// Σ cᵢ·xⁱ from i = 1.
+fn phase_at(coefficients: &[f64], x: f64) -> f64 {
+    coefficients.iter().rev().fold(0.0, |sum, c| (sum + c) * x)
+}
+
+fn bounds(y: &[f64]) -> (f64, f64) {
+    y.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+}
+
+/// Means over a fifteenth of the sweep: noise must not make extrema.
+fn smoothed(y: &[f64]) -> Vec<f64> {
+    let reach = (y.len() / 30).max(1);
+    (0..y.len())
+        .map(|i| {
+            let window = &y[i.saturating_sub(reach)..(i + reach + 1).min(y.len())];
+            window.iter().sum::<f64>() / window.len() as f64
+        })
+        .collect()
+}
+
+/// Phases that the sweep's branches between its extrema tell: half a turn each.
+fn starting_phases(x: &[f64], y: &[f64]) -> Option<Vec<f64>> {
+    let smooth = smoothed(y);
+    let (low, high) = bounds(&smooth);
+    let span = high - low;
+    let scatter = y.iter().zip(&smooth).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / y.len() as f64;
+    if span <= 4.0 * scatter.sqrt() || span <= 0.0 {
+        return None;
+    }
+    // Extrema alternate; one counts once the sweep has moved away from it by a third of the span.
+    let mut turns = Vec::new();
+    let (mut rising, mut extreme) = (true, 0);
+    for (i, &v) in smooth.iter().enumerate() {
+        let further = if rising { v > smooth[extreme] } else { v < smooth[extreme] };
+        if further {
+            extreme = i;
+        } else if (v - smooth[extreme]).abs() > span / 3.0 {
+            turns.push(extreme);
+            rising = !rising;
+            extreme = i;
+        }
+    }
+    let phases = (0..x.len())
+        .map(|i| {
+            let branch = turns.iter().filter(|&&turn| i > turn).count();
+            let half = 2.0 * ((smooth[i] - low) / span).clamp(0.0, 1.0).sqrt().asin();
+            branch.div_ceil(2) as f64 * TAU + if branch % 2 == 0 { half } else { -half }
+        })
+        .collect();
+    Some(phases)
+}
+
+/// Least squares of Σ cᵢ·xⁱ, i = 1 … degree.
+fn polynomial(x: &[f64], y: &[f64], degree: usize) -> Vec<f64> {
+    let mut normal = vec![vec![0.0; degree]; degree];
+    let mut right = vec![0.0; degree];
+    for (&x, &y) in x.iter().zip(y) {
+        for i in 0..degree {
+            right[i] += x.powi(i as i32 + 1) * y;
+            for j in 0..degree {
+                normal[i][j] += x.powi((i + j) as i32 + 2);
+            }
+        }
+    }
+    solve(&mut normal, &mut right).unwrap_or_else(|| {
+        let mut line = vec![0.0; degree];
+        line[0] = PI;
+        line
+    })
+}
+
+/// Levenberg–Marquardt on coefficients, amplitude and offset; returns the inverse of the normal matrix.
+fn refine(x: &[f64], y: &[f64], parameters: &mut [f64], degree: usize) -> Option<Vec<Vec<f64>>> {
+    let count = parameters.len();
+    let error = |p: &[f64]| -> f64 {
+        let model = |x: f64| p[degree + 1] + p[degree] * (0.5 * phase_at(&p[..degree], x)).sin().powi(2);
+        x.iter().zip(y).map(|(&x, &y)| (y - model(x)).powi(2)).sum()
+    };
+    let normal_matrix = |p: &[f64]| {
+        let mut normal = vec![vec![0.0; count]; count];
+        let mut right = vec![0.0; count];
+        for (&x, &y) in x.iter().zip(y) {
+            let phase = phase_at(&p[..degree], x);
+            let mut slopes: Vec<f64> = (1..=degree).map(|i| 0.5 * p[degree] * phase.sin() * x.powi(i as i32)).collect();
+            slopes.extend([(0.5 * phase).sin().powi(2), 1.0]);
+            let miss = y - p[degree + 1] - p[degree] * slopes[degree];
+            for i in 0..count {
+                right[i] += slopes[i] * miss;
+                for j in 0..count {
+                    normal[i][j] += slopes[i] * slopes[j];
+                }
+            }
+        }
+        (normal, right)
+    };
+    let mut damping = 1e-3;
+    let mut least = error(parameters);
+    for _ in 0..200 {
+        let (mut normal, mut step) = normal_matrix(parameters);
+        for (i, row) in normal.iter_mut().enumerate() {
+            row[i] *= 1.0 + damping;
+        }
+        let solved = solve(&mut normal, &mut step)?;
+        let moved: Vec<f64> = parameters.iter().zip(&solved).map(|(p, s)| p + s).collect();
+        let next = error(&moved);
+        if next < least {
+            let settled = least - next < 1e-12 * least;
+            parameters.copy_from_slice(&moved);
+            least = next;
+            damping *= 0.2;
+            if settled {
+                break;
+            }
+        } else {
+            damping *= 5.0;
+            if damping > 1e12 {
+                break;
+            }
+        }
+    }
+    let normal = normal_matrix(parameters).0;
+    let columns: Option<Vec<Vec<f64>>> = (0..count)
+        .map(|k| {
+            let mut unit = vec![0.0; count];
+            unit[k] = 1.0;
+            solve(&mut normal.clone(), &mut unit)
+        })
+        .collect();
+    columns
+}
+
+/// Gaussian elimination with pivots; `None` for a singular matrix.
+fn solve(matrix: &mut [Vec<f64>], right: &mut [f64]) -> Option<Vec<f64>> {
+    let n = right.len();
+    for k in 0..n {
+        let pivot = (k..n).max_by(|&a, &b| matrix[a][k].abs().total_cmp(&matrix[b][k].abs()))?;
+        // Columns of a least-squares matrix differ by powers of ten, never by this much.
+        if matrix[pivot][k].abs() < 1e-300 {
+            return None;
+        }
+        matrix.swap(k, pivot);
+        right.swap(k, pivot);
+        let head = matrix[k].clone();
+        for i in k + 1..n {
+            let factor = matrix[i][k] / head[k];
+            for (a, b) in matrix[i].iter_mut().zip(&head).skip(k) {
+                *a -= factor * b;
+            }
+            right[i] -= factor * right[k];
+        }
+    }
+    for k in (0..n).rev() {
+        let sum: f64 = (k + 1..n).map(|j| matrix[k][j] * right[j]).sum();
+        right[k] = (right[k] - sum) / matrix[k][k];
+    }
+    Some(right.to_vec())
+}
