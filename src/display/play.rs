@@ -18,6 +18,9 @@ const TURN: Duration = Duration::from_millis(5);
 /// Assumed of a monitor that does not tell its refresh rate [Hz].
 const USUAL_REFRESH: f64 = 60.0;
 
+/// Rates that make sense [Hz]; their periods are durations that can be waited for.
+const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
+
 /// How a sequence is played.
 #[derive(Clone, Debug)]
 pub struct PlaySettings {
@@ -40,11 +43,11 @@ pub struct PlaySettings {
 pub struct FrameTime {
     /// Running number, from 0.
     pub number: u64,
-    /// When it should have come.
+    /// When it should have been handed over: up to half a refresh before or after, at the nearest vertical blank.
     pub due: f64,
     /// When the window system had taken it.
     pub presented: f64,
-    /// Whole refreshes of the monitor by which it came late.
+    /// Refreshes of the monitor by which it was handed over late.
     pub missed: u64,
     /// Whether it was late because it had not been made in time.
     pub starved: bool,
@@ -94,7 +97,7 @@ pub struct PlayReport {
 /// # Errors
 ///
 /// Those of [`PanelWindow::open`]; the first error among `frames`; [`Error::Parameter`] for an empty sequence or a
-/// rate that is not positive.
+/// rate outside 0.001 to 10,000 Hz.
 pub fn play(
     display: &mut Display,
     frames: impl Iterator<Item = Result<DisplayFrame>> + Send,
@@ -102,8 +105,9 @@ pub fn play(
     told: &mut dyn FnMut(&FrameTime),
     progress: &Progress,
 ) -> Result<PlayReport> {
-    if let Some(rate) = settings.rate.filter(|rate| !(*rate > 0.0 && rate.is_finite())) {
-        return Err(Error::parameter("fps", format!("{rate} is not a positive number of frames per second")));
+    if let Some(rate) = settings.rate.filter(|rate| !RATES.contains(rate)) {
+        let (least, most) = (RATES.start(), RATES.end());
+        return Err(Error::parameter("fps", format!("{rate} frames per second; give {least} to {most}")));
     }
     std::thread::scope(|scope| {
         let (sender, receiver) = sync_channel(settings.ahead.max(1));
@@ -167,7 +171,7 @@ impl Player {
     fn open(display: &mut Display, first: &Arc<DisplayFrame>, settings: &PlaySettings) -> Result<Self> {
         let start = Instant::now();
         let panel = PanelWindow::open(display, &settings.monitor, first, &settings.window)?;
-        let refresh = 1.0 / panel.monitor().refresh.unwrap_or(USUAL_REFRESH);
+        let refresh = 1.0 / panel.monitor().refresh.filter(|rate| RATES.contains(rate)).unwrap_or(USUAL_REFRESH);
         Ok(Self {
             presenter: panel.presenter().unwrap_or_default(),
             adapter: panel.adapter(),
@@ -199,8 +203,8 @@ impl Player {
             taken: true,
             vertical_blank: None,
         });
-        // At the monitor's own rate the blank sets the time: be there well before it.
-        let early = if settings.rate.is_none() { 0.5 * self.refresh } else { 0.0 };
+        // Where blanks are told, a frame goes to the blank that is nearest to its time: be there half a refresh before.
+        let early = if self.panel.tells_vertical_blanks() { 0.5 * self.refresh } else { 0.0 };
         let mut due = self.period;
         let end = loop {
             match self.wait(display, Some(due - early), settings.on_absence, progress)? {
@@ -214,10 +218,10 @@ impl Player {
                 Next::End(end) => break end,
             };
             let vertical_blank = self.panel.wait_for_vertical_blank(Duration::from_secs_f64(2.0 * self.refresh))?;
+            let handed_over = self.now();
             let shown = self.panel.present(&frame)?;
             let presented = (shown.at - self.origin).as_secs_f64();
-            // A frame that comes within the refresh in which it was due is in time.
-            let missed = ((presented - due) / self.refresh).max(0.0) as u64;
+            let missed = ((handed_over - due) / self.refresh).round().max(0.0) as u64;
             told(&FrameTime {
                 number: shown.number,
                 due,
@@ -232,8 +236,9 @@ impl Player {
             self.counts.refused += u64::from(!shown.taken);
             self.longest = self.longest.max(presented - self.last);
             self.last = presented;
-            // Each frame has its full time on the panel: after a late one, the next does not hurry.
-            due = if missed > 0 || settings.rate.is_none() { presented } else { due } + self.period;
+            // Each frame has its full time on the panel: after a late one, the next does not hurry. At the monitor's own
+            // rate its blanks set the time.
+            due = if missed > 0 || settings.rate.is_none() { handed_over } else { due } + self.period;
         };
         self.report(display, end)
     }

@@ -175,6 +175,11 @@ impl PanelWindow {
         Ok(Presented { number: self.frames - 1, at: Instant::now(), taken })
     }
 
+    /// Whether [`PanelWindow::wait_for_vertical_blank`] waits.
+    pub(super) fn tells_vertical_blanks(&self) -> bool {
+        self.open.as_ref().is_some_and(|open| open.blank.is_some())
+    }
+
     /// Waits for the monitor's next vertical blank, if frames are not made to wait for it by the graphics card and the
     /// X server tells of it. Returns the server's count of them.
     pub(super) fn wait_for_vertical_blank(&mut self, limit: Duration) -> Result<Option<u64>> {
