@@ -52,7 +52,8 @@
 //! 13. [`encode`]: field to phase or fringes for a panel's levels and range
 //! 14. [`reconstruction`]: field to pictures, and how good they are
 //! 15. [`pipeline`]: the whole way, on one screen
-//! 16. [`display`]: monitors and the fullscreen window (feature `display`)
+//! 16. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols
+//! 17. [`display`]: monitors and the fullscreen window (feature `display`)
 
 #[cfg(feature = "display")]
 pub mod display;

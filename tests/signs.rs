@@ -119,6 +119,75 @@ fn up_is_up_and_left_is_left_from_point_to_picture_for_every_encoding_and_both_s
     }
 }
 
+/// The values of one cell of a two by two division of a picture: 0 top left, 1 top right, 2 and 3 below.
+fn quarter(values: &[f32], width: usize, cell: usize) -> Vec<Vec<f32>> {
+    let half = width / 2;
+    let (left, top) = (cell % 2 * half, cell / 2 * half);
+    (0..half).map(|r| values[(top + r) * width + left..(top + r) * width + left + half].to_vec()).collect()
+}
+
+/// Correlation coefficient of two pictures of one size.
+fn correlation(a: &[Vec<f32>], b: &[Vec<f32>]) -> f64 {
+    let flat = |p: &[Vec<f32>]| -> Vec<f64> { p.iter().flatten().map(|v| f64::from(*v)).collect() };
+    let (a, b) = (flat(a), flat(b));
+    let mean = |p: &[f64]| p.iter().sum::<f64>() / p.len() as f64;
+    let (ma, mb) = (mean(&a), mean(&b));
+    let dot = |p: &[f64], mp: f64, q: &[f64], mq: f64| p.iter().zip(q).map(|(x, y)| (x - mp) * (y - mq)).sum::<f64>();
+    dot(&a, ma, &b, mb) / (dot(&a, ma, &a, ma) * dot(&b, mb, &b, mb)).sqrt()
+}
+
+#[test]
+fn each_letter_of_the_depth_chart_is_upright_and_sharp_at_its_own_depth_only() {
+    // The whole way: glTF, points, hologram, an 8-bit double-phase frame, the simulated panel, reconstruction.
+    let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/depth-chart.gltf");
+    let profile = PanelProfile::generic().expect("profile");
+    let mut settings = pipeline::SceneSettings::default();
+    (settings.trace.width, settings.trace.height) = (300, 300);
+    let encode = EncodeSettings::new(Encoding::named("double-phase").expect("encoding"));
+    let all = (&settings, &HologramSettings::default(), &encode);
+    let out = pipeline::run(&scene, &profile, WAVELENGTH, all, &Progress::new()).expect("run");
+    let view = &out.lit.view;
+    let target: Vec<f32> = view.picture.iter().map(|rgb| rgb[1]).collect();
+    let mut look = holodrive::reconstruction::ViewSettings { aperture: out.aperture, ..Default::default() };
+    look.block_zero_order(0.05f64.to_radians(), WAVELENGTH);
+    let depths: Vec<f64> = (0..4)
+        .map(|cell| {
+            let lit = (0..target.len()).filter(|i| target[*i] > 0.5 && i % 300 / 150 + i / 300 / 150 * 2 == cell);
+            let mut z: Vec<f64> = lit.filter_map(|i| view.depths[i]).collect();
+            z.sort_by(f64::total_cmp);
+            z[z.len() / 2]
+        })
+        .collect();
+    assert!(depths.windows(2).all(|d| d[0] - d[1] > 0.008), "four depths, apart: {depths:?}");
+    let seen: Vec<Picture> = depths
+        .iter()
+        .map(|&z| {
+            let half = view.placing.view_at(z);
+            reconstruction::picture(&out.behind, &View::Plane { z }, half, (300, 300), &look, &Progress::new())
+                .expect("picture")
+        })
+        .collect();
+    for cell in 0..4 {
+        let wanted = quarter(&target, 300, cell);
+        let own = quarter(&seen[cell].values, 300, cell);
+        let likeness = correlation(&own, &wanted);
+        // Speckle of full contrast on a letter that fills about half of its quarter leaves a correlation near 0.6.
+        assert!(likeness > 0.5, "letter {cell}: {likeness}");
+        for (other, picture) in seen.iter().enumerate().filter(|(other, _)| *other != cell) {
+            let blurred = correlation(&quarter(&picture.values, 300, cell), &wanted);
+            assert!(blurred < 0.85 * likeness, "letter {cell} at the depth of {other}: {blurred}, own {likeness}");
+        }
+        let mirrored: Vec<Vec<f32>> = own.iter().map(|row| row.iter().rev().copied().collect()).collect();
+        let flipped: Vec<Vec<f32>> = own.iter().rev().cloned().collect();
+        let turned: Vec<Vec<f32>> = mirrored.iter().rev().cloned().collect();
+        for (name, wrong) in [("mirrored", mirrored), ("flipped", flipped), ("turned", turned)] {
+            let alike = correlation(&wrong, &wanted);
+            assert!(alike < 0.8 * likeness, "letter {cell} {name}: {alike}, upright {likeness}");
+        }
+        println!("letter {cell} at z = {:.1} mm: correlation {likeness:.3}", depths[cell] * 1e3);
+    }
+}
+
 #[test]
 fn a_reference_at_a_positive_angle_runs_to_the_right_and_up() {
     let mut profile = PanelProfile::generic().expect("profile");

@@ -55,6 +55,9 @@ pub(crate) enum Command {
     Show(ShowArgs),
     /// List the monitors, and which panel profile fits each.
     Monitors(MonitorsArgs),
+    /// Look at everything on this desktop that alters levels on their way to a panel.
+    #[command(after_help = "Examples:\n  holodrive doctor\n  holodrive doctor --monitor HDMI-1 --card card.png")]
+    Doctor(DoctorArgs),
 }
 
 /// Which panel.
@@ -374,6 +377,9 @@ pub(crate) struct ShowArgs {
     /// Block the zero order within this angle of the axis, where the encoding's Fourier stop stands; 0deg lets it pass.
     #[arg(long, default_value = "0.05deg", value_parser = units::angle, value_name = "ANGLE")]
     pub(crate) zero_order_stop: f64,
+    /// Show the frame even where a gamma table (night light) alters its levels; the report says what does.
+    #[arg(long)]
+    pub(crate) allow_altered_levels: bool,
     /// What brings the levels to the screen.
     #[arg(long, value_enum, default_value_t = PresenterArg::Auto)]
     pub(crate) present: PresenterArg,
@@ -400,6 +406,20 @@ pub(crate) struct MonitorsArgs {
     /// Say whether this panel profile fits.
     #[arg(long, value_name = "PROFILE")]
     pub(crate) panel: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DoctorArgs {
+    /// Only this monitor (see `holodrive monitors`).
+    #[arg(long, value_name = "NAME")]
+    pub(crate) monitor: Option<String>,
+    /// Also write a numbered test card of the first monitor's size: with it an eye or a capture card sees whether pixels
+    /// arrive one to one.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) card: Option<PathBuf>,
+    /// Also write the findings to this file, as JSON.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
 }
 
 fn size(text: &str) -> Result<(usize, usize), String> {

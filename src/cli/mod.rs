@@ -3,6 +3,7 @@
 mod args;
 mod bar;
 mod commands;
+mod monitors;
 mod report;
 #[cfg(feature = "display")]
 mod screen;
@@ -36,7 +37,8 @@ pub(crate) fn main() -> ExitCode {
         Command::Encode(args) => commands::encode(&args),
         Command::Reconstruct(args) => commands::reconstruct(&args),
         Command::Show(args) => show::show(&args),
-        Command::Monitors(args) => commands::monitors(&args),
+        Command::Monitors(args) => monitors::monitors(&args),
+        Command::Doctor(args) => monitors::doctor(&args),
     };
     match outcome.and_then(|report| report.print(json)) {
         Ok(()) => ExitCode::SUCCESS,
@@ -54,7 +56,7 @@ fn one_line(refused: &clap::Error) -> String {
     let words = first.join(" ");
     let words = words.strip_prefix("error: ").unwrap_or(&words);
     if refused.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return "holodrive: a command is needed: points, compute, propagate, encode, reconstruct, show or monitors (see holodrive --help)".into();
+        return "holodrive: a command is needed: points, compute, propagate, encode, reconstruct, show, monitors or doctor (see holodrive --help)".into();
     }
     format!("holodrive: {words} (see holodrive --help)")
 }

@@ -49,7 +49,7 @@ impl Screen {
         };
         let settings = ShowSettings {
             monitor: self.choice.clone(),
-            window: WindowSettings { presenter, ..WindowSettings::default() },
+            window: WindowSettings { presenter, exact: !args.allow_altered_levels, ..WindowSettings::default() },
             hold,
             on_absence: OnAbsence::End,
         };

@@ -6,6 +6,7 @@
 //! The tests share one server and change its monitors, so they run one after another; each starts this binary again as
 //! the program under test. Hence no libtest harness; the output is in its form.
 
+mod binary;
 mod child;
 mod desk;
 mod frames;
@@ -39,9 +40,16 @@ fn main() -> ExitCode {
         return code;
     }
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let cases: Vec<Case> =
-        [monitors::CASES, pixels::CASES, ownership::CASES, timing::CASES, serving::CASES, window_manager::CASES]
-            .concat();
+    let cases: Vec<Case> = [
+        monitors::CASES,
+        pixels::CASES,
+        ownership::CASES,
+        timing::CASES,
+        serving::CASES,
+        window_manager::CASES,
+        binary::CASES,
+    ]
+    .concat();
     if arguments.iter().any(|argument| argument == "--list") {
         cases.iter().for_each(|(name, _)| println!("{name}: test"));
         return ExitCode::SUCCESS;

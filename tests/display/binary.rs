@@ -1,0 +1,95 @@
+//! The program itself: its commands for a real monitor, as a user types them.
+
+use crate::desk::Desk;
+use crate::frames::Picture;
+use crate::server::{ODD_PANEL, OPERATOR, PANEL};
+use crate::{Case, Ended};
+use holodrive::panel::{Frame, PanelProfile};
+use holodrive::random::Random;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+pub(crate) const CASES: &[Case] = &[
+    ("the_program_lists_the_monitors_and_names_them_when_one_is_not_there", monitors),
+    ("the_program_shows_every_level_of_a_frame_on_the_monitor_asked_for", show),
+    ("every_display_command_of_the_readme_runs", readme),
+];
+
+fn program(desk: &Desk, folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_holodrive"));
+    command.args(arguments).current_dir(folder).env("DISPLAY", desk.display()).env_remove("WAYLAND_DISPLAY");
+    command
+}
+
+/// A frame of random levels for the generic panel, written as `frame.png`; returns what must be on the screen.
+fn frame(folder: &Path) -> Picture {
+    let profile = PanelProfile::generic().expect("profile");
+    let mut random = Random::new(20, 26);
+    let levels: Vec<u16> = (0..profile.width * profile.height).map(|_| (random.bits() & 255) as u16).collect();
+    let pixels = levels.iter().map(|&level| [level as u8; 3]).collect();
+    let frame = Frame::new(&profile, profile.default_wavelength(), levels).expect("frame");
+    frame.write(&folder.join("frame.png")).expect("write");
+    Picture { width: profile.width as u32, height: profile.height as u32, pixels }
+}
+
+fn monitors(desk: &Desk) -> Ended {
+    let folder = tempfile::tempdir().expect("folder");
+    let listed = program(desk, folder.path(), &["monitors", "--json"]).output().expect("runs");
+    let report: serde_json::Value = serde_json::from_slice(&listed.stdout).expect("JSON");
+    let names: Vec<&str> =
+        report["monitors"].as_array().expect("list").iter().filter_map(|m| m["name"].as_str()).collect();
+    assert!([OPERATOR, PANEL, ODD_PANEL].iter().all(|name| names.contains(name)), "{report}");
+    frame(folder.path());
+    let refused = program(desk, folder.path(), &["show", "frame.png", "--monitor", "HDMI-7"]).output().expect("runs");
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    assert!(said.lines().count() == 1 && said.contains("HDMI-7") && said.contains(PANEL), "{said}");
+    assert!(!folder.path().join("holodrive-out").exists(), "a folder was left");
+    // The operator's monitor has another size than the panel.
+    let refused = program(desk, folder.path(), &["show", "frame.png", "--monitor", OPERATOR]).output().expect("runs");
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(2) && said.contains("1920"), "{said}");
+    Ended::Passed
+}
+
+fn show(desk: &Desk) -> Ended {
+    let folder = tempfile::tempdir().expect("folder");
+    let wanted = frame(folder.path());
+    let others = [OPERATOR, ODD_PANEL].map(|name| desk.plug(name));
+    let before = others.each_ref().map(|plug| desk.capture_monitor(plug));
+    let arguments = ["show", "frame.png", "--monitor", PANEL, "--present", "software"];
+    let mut running = program(desk, folder.path(), &arguments).stdout(Stdio::null()).spawn().expect("runs");
+    desk.wait_for(&desk.plug(PANEL), &wanted);
+    for (plug, before) in others.iter().zip(&before) {
+        assert!(desk.capture_monitor(plug) == *before, "another monitor was touched");
+    }
+    // Ctrl-C, as a terminal sends it.
+    let interrupted = Command::new("kill").args(["-INT", &running.id().to_string()]).status().expect("kill");
+    assert!(interrupted.success());
+    assert!(running.wait().expect("ends").success(), "an ended show is no failure");
+    assert!(folder.path().join("holodrive-out/report.json").is_file());
+    Ended::Passed
+}
+
+fn readme(desk: &Desk) -> Ended {
+    let folder = tempfile::tempdir().expect("folder");
+    frame(folder.path());
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md");
+    let mut inside = false;
+    let mut run = 0;
+    for line in text.lines() {
+        if let Some(kind) = line.trim().strip_prefix("```") {
+            inside = kind == "sh display";
+        } else if inside && !line.trim().is_empty() {
+            // The README's monitor is called as most are; here it is the dummy driver's.
+            let line = line.replace("HDMI-1", PANEL);
+            let words: Vec<&str> = line.split(" #").next().unwrap_or("").split_whitespace().collect();
+            assert_eq!(words[0], "holodrive", "{line}");
+            let out = program(desk, folder.path(), &words[1..]).output().expect("runs");
+            assert!(out.status.success(), "{line}: {}", String::from_utf8_lossy(&out.stderr));
+            run += 1;
+        }
+    }
+    assert!(run >= 3, "only {run} commands were found");
+    Ended::Passed
+}
