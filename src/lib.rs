@@ -47,16 +47,23 @@
 //! 8. [`illumination`]: light arriving on surfaces: form factors, radiosity, direct light
 //! 9. [`points`]: rays to point sources; placement before the panel; PLY; pictures with depth
 //! 10. [`propagation`]: plane to plane
+//! 11. [`hologram`]: points to the field on the panel: oracle, engines, planner
 //! 12. [`panel`]: profiles, frames of drive levels, packing, the simulated panel
 //! 13. [`encode`]: field to phase or fringes for a panel's levels and range
 //! 14. [`reconstruction`]: field to pictures, and how good they are
+//! 15. [`pipeline`]: the whole way, on one screen
 //! 16. [`display`]: monitors and the fullscreen window (feature `display`)
 
+#[cfg(feature = "display")]
+pub mod display;
 pub mod encode;
 pub mod error;
 pub mod field;
 pub mod files;
+pub mod hologram;
+pub mod illumination;
 pub mod panel;
+pub mod pipeline;
 pub mod points;
 pub mod progress;
 pub mod propagation;

@@ -1,3 +1,7 @@
-//! The binary `holodrive`.
+//! The binary `holodrive`: flags as typed → resolved settings → one library call; bars and prose only here.
 
-fn main() {}
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::main()
+}

@@ -9,7 +9,7 @@
 
 use super::{EncodedPattern, amplitude_at, band};
 use crate::error::{Error, Result};
-use crate::field::Field;
+use crate::field::{Complex32, Complex64, Field, Grid};
 use crate::panel::{EncodingRecord, Illumination, Modulation, Pattern, PhasePattern};
 use crate::progress::Progress;
 use rayon::prelude::*;
@@ -39,43 +39,40 @@ pub struct DoublePhase {
     /// Conjugate orders stay out where at least one share in the interlacing's directions is at most a half.
     pub band: [f64; 2],
     /// The amplitude that becomes 1 is the one below which this share of the samples lies; larger ones are clipped.
-    pub percentile: f64,
+    /// Absent: the one of [`PERCENTILES`] that leaves the least error in the band, found on the panel's middle.
+    pub percentile: Option<f64>,
 }
 
 impl Default for DoublePhase {
-    /// A checkerboard, half the band along both axes, and one sample in twenty clipped: for diffuse light, whose few
-    /// bright samples would darken all others, that gives the smallest error.
+    /// A checkerboard, half the band along both axes, and as much clipped as is best for the field.
     fn default() -> Self {
-        Self { interlace: Interlace::Checkerboard, band: [0.5, 0.5], percentile: 0.95 }
+        Self { interlace: Interlace::Checkerboard, band: [0.5, 0.5], percentile: None }
     }
 }
+
+/// What is tried where no percentile is given. A field of random phases (speckle) errs least near 0.9: larger
+/// amplitudes leave √(1 − |u|²) near 1 nearly everywhere, and what of it falls into the band is noise. A smooth field
+/// errs least without clipping.
+pub const PERCENTILES: [f64; 6] = [0.8, 0.9, 0.95, 0.99, 0.999, 1.0];
+
+/// Side of the part of the panel on which percentiles are compared [pixels]; even, so that the interlacing goes on.
+const TRIAL: usize = 512;
 
 pub(super) fn pattern(field: &Field, settings: &DoublePhase, progress: &Progress) -> Result<EncodedPattern> {
     let aperture = band::of_share(field, settings.band)?;
     let (target, dropped) = band::limit(field, &aperture);
     progress.advance(1);
     progress.check()?;
-    let greatest = amplitude_at(&target, settings.percentile)?;
+    let percentile = match settings.percentile {
+        Some(percentile) => percentile,
+        None => best_percentile(&target, settings)?,
+    };
+    let greatest = amplitude_at(&target, percentile)?;
     if greatest == 0.0 {
         let what = "no light within the encoding's band; widen it, or move the object nearer to the panel's axis";
         return Err(Error::parameter("band", what));
     }
-    let width = field.grid.width;
-    let phase: Vec<f32> = target
-        .samples
-        .par_iter()
-        .enumerate()
-        .map(|(i, u)| {
-            let (column, row) = (i % width, i / width);
-            let plus = match settings.interlace {
-                Interlace::Checkerboard => (column + row) % 2 == 0,
-                Interlace::Columns => column % 2 == 0,
-                Interlace::Rows => row % 2 == 0,
-            };
-            let half = (u.norm() / greatest).min(1.0).acos();
-            u.im.atan2(u.re) + if plus { half } else { -half }
-        })
-        .collect();
+    let phase = phases(&target, f64::from(greatest), settings.interlace);
     // The greatest amplitude itself may round to either side.
     let clipped =
         target.samples.iter().filter(|u| u.norm() > greatest * (1.0 + 1e-6)).count() as f64 / phase.len() as f64;
@@ -93,7 +90,7 @@ pub(super) fn pattern(field: &Field, settings: &DoublePhase, progress: &Progress
     let parameters = BTreeMap::from([
         ("interlace".to_owned(), serde_json::json!(settings.interlace)),
         ("band".to_owned(), serde_json::json!(settings.band)),
-        ("percentile".to_owned(), serde_json::json!(settings.percentile)),
+        ("percentile".to_owned(), serde_json::json!(percentile)),
         ("amplitude".to_owned(), serde_json::json!(greatest)),
     ]);
     let record = EncodingRecord {
@@ -106,4 +103,53 @@ pub(super) fn pattern(field: &Field, settings: &DoublePhase, progress: &Progress
     };
     let pattern = Pattern::Phase(PhasePattern::new(field.grid, field.wavelength, phase)?);
     Ok(EncodedPattern { pattern, record, target, clipped, dropped, warnings })
+}
+
+/// θ± = arg u ± arccos(|u|/greatest) on the pixels that show them [rad].
+fn phases(target: &Field, greatest: f64, interlace: Interlace) -> Vec<f32> {
+    let width = target.grid.width;
+    let greatest = greatest as f32;
+    let of = |(i, u): (usize, &Complex32)| {
+        let (column, row) = (i % width, i / width);
+        let plus = match interlace {
+            Interlace::Checkerboard => (column + row) % 2 == 0,
+            Interlace::Columns => column % 2 == 0,
+            Interlace::Rows => row % 2 == 0,
+        };
+        let half = (u.norm() / greatest).min(1.0).acos();
+        u.im.atan2(u.re) + if plus { half } else { -half }
+    };
+    target.samples.par_iter().enumerate().map(of).collect()
+}
+
+/// The percentile with the least relative error in the band, after the best complex factor, on the panel's middle.
+fn best_percentile(target: &Field, settings: &DoublePhase) -> Result<f64> {
+    let grid = target.grid;
+    let (width, height) = (grid.width.min(TRIAL), grid.height.min(TRIAL));
+    let (left, top) = ((grid.width - width) / 2, (grid.height - height) / 2);
+    let middle = Grid::new(width, height, grid.pitch_x, grid.pitch_y)?;
+    let samples =
+        (0..middle.len()).map(|i| target.samples[(top + i / width) * grid.width + left + i % width]).collect();
+    let cut = Field::new(middle, target.wavelength, samples)?;
+    let aperture = band::centered(&cut, settings.band);
+    let (wanted, _) = band::limit(&cut, &aperture);
+    let mut best = (f64::INFINITY, PERCENTILES[0]);
+    for percentile in PERCENTILES {
+        let greatest = f64::from(amplitude_at(&wanted, percentile)?);
+        if greatest == 0.0 {
+            continue;
+        }
+        let shown = phases(&wanted, greatest, settings.interlace).into_iter().map(|p| Complex32::from_polar(1.0, p));
+        let (seen, _) = band::limit(&Field::new(middle, target.wavelength, shown.collect())?, &aperture);
+        let overlap: Complex64 = wanted.samples.iter().zip(&seen.samples).map(|(a, b)| wide(a).conj() * wide(b)).sum();
+        let error = 1.0 - overlap.norm_sqr() / (wanted.energy() * seen.energy()).max(f64::MIN_POSITIVE);
+        if error < best.0 {
+            best = (error, percentile);
+        }
+    }
+    Ok(best.1)
+}
+
+fn wide(u: &Complex32) -> Complex64 {
+    Complex64::new(u.re.into(), u.im.into())
 }

@@ -80,7 +80,7 @@ fn double_phase_gives_a_smooth_field_back_within_its_band() {
         for strength in [0.01, 0.05] {
             let field = smooth(grid, 0.2, strength);
             for interlace in [Interlace::Checkerboard, Interlace::Columns, Interlace::Rows] {
-                let settings = DoublePhase { interlace, band: [0.5, 0.5], percentile: 1.0 };
+                let settings = DoublePhase { interlace, band: [0.5, 0.5], percentile: Some(1.0) };
                 let made =
                     pattern(&field, &Encoding::DoublePhase(settings), &profile, &Progress::new()).expect("pattern");
                 let error = relative_error(&decoded(&made).samples, &field.samples);

@@ -3,8 +3,10 @@
 pub mod images;
 pub mod placement;
 pub mod ply;
+pub mod trace;
 
 pub use placement::{Placed, Placement, place};
+pub use trace::{TraceSettings, Traced, TracedPoint, trace};
 
 use glam::DVec3;
 

@@ -60,6 +60,17 @@ impl Default for ViewSettings {
     }
 }
 
+impl ViewSettings {
+    /// Puts an opaque disc into the Fourier plane that takes out what leaves the panel within `angle` [rad] of its
+    /// normal: the light that dead space and curve errors leave unmodulated. Without an aperture there is no such plane,
+    /// and nothing happens.
+    pub fn block_zero_order(&mut self, angle: f64, wavelength: f64) {
+        if let Some(aperture) = &mut self.aperture {
+            aperture.stop = angle.sin().abs() / wavelength;
+        }
+    }
+}
+
 /// Intensity |u|² of the view on the rectangle of half size `half` [m] about the middle of its focal plane, on samples
 /// of the field's pitch.
 ///

@@ -1,6 +1,17 @@
 //! Ray casting: the only file that names `obvhs`.
+//!
+//! Traversal runs in f32 on the scene's own f32 corners; a hit is then refined in f64 by the intersection of the ray
+//! with the plane of the triangle that was found, so that depths keep their digits at any distance.
+//!
+//! *Sides.* Eyes pass the back of a one-sided surface ([`Sides::Front`], what glTF calls culling), so that a camera may
+//! stand outside a room of one-sided walls. Light does not ([`Sides::Both`]): a sheet that is not drawn from behind
+//! still stands in the way and is black there, or the lamp of the next room would shine through every such wall.
+//!
+//! *Holes.* Where a masked material's alpha is below its cutoff there is no surface for any ray.
 
-use glam::DVec3;
+use super::{AlphaMode, Scene};
+use glam::{DVec3, Vec2, Vec3A};
+use obvhs::{BvhBuildParams, cwbvh::CwBvh, cwbvh::builder::build_cwbvh_from_tris, ray, rt_triangle::RtTriangle};
 
 /// A ray in world space, double precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,4 +20,451 @@ pub struct Ray {
     pub origin: DVec3,
     /// Unit direction.
     pub direction: DVec3,
+}
+
+impl Ray {
+    /// The point at a distance along the ray [m].
+    pub fn at(&self, distance: f64) -> DVec3 {
+        self.origin + self.direction * distance
+    }
+}
+
+/// Which sides of one-sided surfaces stop a ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sides {
+    /// Front sides only: what an eye sees.
+    Front,
+    /// Both sides: what stands in the way of light.
+    Both,
+}
+
+/// Where a ray meets a triangle, in double precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Index into [`Scene::triangles`].
+    pub triangle: u32,
+    /// Distance along the ray [m].
+    pub distance: f64,
+    /// Where [m].
+    pub position: DVec3,
+    /// Weights of the second and third corner; the first has one minus their sum.
+    pub barycentric: [f64; 2],
+    /// Whether the counter-clockwise side was met.
+    pub front: bool,
+}
+
+/// A hit as traversal leaves it, in single precision: enough to look light up, not to place a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Meeting {
+    /// Index into [`Scene::triangles`].
+    pub triangle: u32,
+    /// Distance along the ray [m].
+    pub distance: f32,
+    /// Weights of the second and third corner.
+    pub barycentric: [f32; 2],
+    /// Whether the counter-clockwise side was met.
+    pub front: bool,
+}
+
+const ONE_SIDED: u32 = 1;
+const MASKED: u32 = 2;
+
+/// A triangle as traversal wants it, in the order of the tree's leaves.
+#[derive(Clone, Copy)]
+struct Leaf {
+    triangle: RtTriangle,
+    index: u32,
+    flags: u32,
+}
+
+/// The scene's triangles in a bounding volume hierarchy (obvhs, eight-wide compressed).
+pub struct SceneBvh<'s> {
+    scene: &'s Scene,
+    tree: CwBvh,
+    leaves: Vec<Leaf>,
+    /// Units of traversal per metre: a power of two that makes the scene about a thousand units large, since obvhs
+    /// passes boxes that end nearer than 1e-4 units.
+    scale: f64,
+    /// Length by which rays start off the surface that they leave [m].
+    offset: f64,
+}
+
+impl<'s> SceneBvh<'s> {
+    /// Builds the tree. Triangles without area and with corners that are not finite are left out: no ray meets them.
+    pub fn new(scene: &'s Scene) -> Self {
+        let mut indices = Vec::with_capacity(scene.triangles.len());
+        let mut triangles = Vec::with_capacity(scene.triangles.len());
+        let mut reach = 0.0f64;
+        for (index, triangle) in scene.triangles.iter().enumerate() {
+            if triangle.area() > 0.0 && triangle.positions.iter().all(|p| p.is_finite()) {
+                indices.push(index as u32);
+                reach = triangle.corners().iter().fold(reach, |r, p| r.max(p.abs().max_element()));
+            }
+        }
+        let reach = reach.max(1e-20);
+        let scale = (1000.0 / reach).log2().round().exp2();
+        for &index in &indices {
+            let [v0, v1, v2] = scene.triangles[index as usize].corners().map(|p| (p * scale).as_vec3a());
+            triangles.push(obvhs::triangle::Triangle { v0, v1, v2 });
+        }
+        let mut tree = if triangles.is_empty() {
+            CwBvh::default()
+        } else {
+            build_cwbvh_from_tris(&triangles, BvhBuildParams::medium_build(), &mut std::time::Duration::default())
+        };
+        let leaves = tree
+            .primitive_indices
+            .iter()
+            .map(|&i| {
+                let index = indices[i as usize];
+                let material = scene.material(index);
+                // Light that went into a glass body must find the way out.
+                let two_sided = material.double_sided || material.transmission > 0.0;
+                let one_sided = if two_sided { 0 } else { ONE_SIDED };
+                let masked = if matches!(material.alpha_mode, AlphaMode::Mask(_)) { MASKED } else { 0 };
+                Leaf { triangle: RtTriangle::from(&triangles[i as usize]), index, flags: one_sided | masked }
+            })
+            .collect();
+        tree.exact_node_aabbs = None;
+        // A corner at distance `reach` from the world's origin is rounded by up to 6e-8 of it, and traversal adds a
+        // few roundings of the same size: 4e-6 is beyond them and far below anything that is modelled.
+        Self { scene, tree, leaves, scale, offset: 4e-6 * reach }
+    }
+
+    /// The scene that the tree was built from.
+    pub fn scene(&self) -> &'s Scene {
+        self.scene
+    }
+
+    /// Number of triangles that rays can meet.
+    pub fn triangle_count(&self) -> usize {
+        self.leaves.len()
+    }
+
+    /// How far a ray's start is to be lifted off a surface so that it does not meet it again [m].
+    pub fn offset(&self) -> f64 {
+        self.offset
+    }
+
+    /// First surface along a ray beyond `min` and before `max` [m], in single precision.
+    pub fn meet(&self, ray: &Ray, min: f64, max: f64, sides: Sides) -> Option<Meeting> {
+        if self.leaves.is_empty() {
+            return None;
+        }
+        let mut hit = ray::RayHit::none();
+        let cast = self.traversal(ray.origin, ray.direction, min, max);
+        let found = self.tree.ray_traverse(cast, &mut hit, |r, id| self.distance(r, id, sides));
+        found.then(|| {
+            let leaf = &self.leaves[hit.primitive_id as usize];
+            let barycentric = leaf.triangle.compute_barycentric(&cast).to_array();
+            let front = leaf.triangle.ng.dot(cast.direction) > 0.0;
+            Meeting { triangle: leaf.index, distance: hit.t / self.scale as f32, barycentric, front }
+        })
+    }
+
+    /// First surface that an eye sees along a ray beyond `min` [m]; NaN directions meet nothing.
+    pub fn nearest(&self, ray: &Ray, min: f64, sides: Sides) -> Option<Hit> {
+        self.meet(ray, min, f64::INFINITY, sides).map(|meeting| self.refined(ray, &meeting))
+    }
+
+    /// The same for a ray that starts on a surface with unit geometric `normal`: traversal starts off the surface by
+    /// [`SceneBvh::offset`], on the side to which the ray goes, but the distance is measured from the ray's own origin.
+    pub fn nearest_leaving(&self, ray: &Ray, normal: DVec3, sides: Sides) -> Option<Hit> {
+        let side = self.offset.copysign(normal.dot(ray.direction));
+        let lifted = Ray { origin: ray.origin + normal * side, direction: ray.direction };
+        self.meet(&lifted, 0.0, f64::INFINITY, sides).map(|meeting| self.refined(ray, &meeting))
+    }
+
+    /// The hit in double precision.
+    pub fn refined(&self, ray: &Ray, meeting: &Meeting) -> Hit {
+        let triangle = &self.scene.triangles[meeting.triangle as usize];
+        let [a, b, c] = triangle.corners();
+        let cross = triangle.cross();
+        let slope = cross.dot(ray.direction);
+        // A ray in the triangle's own plane has no better distance than the one that traversal found.
+        let exact = cross.dot(a - ray.origin) / slope;
+        let trusted = exact.is_finite() && (exact - f64::from(meeting.distance)).abs() <= 64.0 * self.offset;
+        let distance = if trusted { exact } else { f64::from(meeting.distance) };
+        let position = ray.at(distance);
+        let squared = cross.length_squared();
+        let v = ((c - b).cross(position - b)).dot(cross) / squared;
+        let w = ((a - c).cross(position - c)).dot(cross) / squared;
+        let (u, v) = (w.clamp(0.0, 1.0), (1.0 - v - w).clamp(0.0, 1.0));
+        Hit { triangle: meeting.triangle, distance, position, barycentric: [u, v], front: slope < 0.0 }
+    }
+
+    /// Whether anything that stops light stands on the open segment between two points. Both ends should be lifted off
+    /// their surfaces by [`SceneBvh::offset`].
+    pub fn occluded(&self, from: DVec3, to: DVec3) -> bool {
+        let span = to - from;
+        let length = span.length();
+        if self.leaves.is_empty() || length.is_nan() || length <= 0.0 {
+            return false;
+        }
+        let cast = self.traversal(from, span / length, 0.0, length);
+        !self.tree.ray_traverse_miss(cast, |r, id| self.distance(r, id, Sides::Both))
+    }
+
+    fn traversal(&self, origin: DVec3, direction: DVec3, min: f64, max: f64) -> ray::Ray {
+        // Adding zero turns −0 into 0: obvhs takes −0 for a negative slope in one place and for none in another, and
+        // loses the boxes that it then enters from behind.
+        let direction = direction.as_vec3a() + Vec3A::ZERO;
+        ray::Ray::new((origin * self.scale).as_vec3a(), direction, (min * self.scale) as f32, (max * self.scale) as f32)
+    }
+
+    #[inline(always)]
+    fn distance(&self, ray: &ray::Ray, id: usize, sides: Sides) -> f32 {
+        let leaf = &self.leaves[id];
+        let distance = intersect(&leaf.triangle, ray);
+        if distance == f32::INFINITY || leaf.flags == 0 {
+            return distance;
+        }
+        let back = leaf.triangle.ng.dot(ray.direction) <= 0.0;
+        let culled = back && sides == Sides::Front && leaf.flags & ONE_SIDED != 0;
+        if culled || (leaf.flags & MASKED != 0 && self.is_hole(leaf, ray)) {
+            return f32::INFINITY;
+        }
+        distance
+    }
+
+    #[cold]
+    fn is_hole(&self, leaf: &Leaf, ray: &ray::Ray) -> bool {
+        let weights: Vec2 = leaf.triangle.compute_barycentric(ray);
+        let material = self.scene.material(leaf.index);
+        let AlphaMode::Mask(cutoff) = material.alpha_mode else { return false };
+        let alpha = material.base_color_texture.map_or(1.0, |reference| {
+            let triangle = &self.scene.triangles[leaf.index as usize];
+            let [a, b, c] = triangle.texcoords.map(|sets| sets[reference.texcoord as usize & 1]);
+            let uv = a + (b - a) * weights.x + (c - a) * weights.y;
+            self.scene.textures[reference.texture as usize].sample(reference.transform(uv), 0.0).w
+        });
+        alpha * material.alpha < cutoff
+    }
+}
+
+/// By how much of its own size a triangle is widened, so that no ray slips through between two that share an edge: the
+/// roundings of their tests differ.
+const OVERLAP: f32 = 1e-5;
+
+/// Distance at which a ray meets a triangle; infinite if it does not (Möller & Trumbore 1997).
+#[inline(always)]
+fn intersect(triangle: &RtTriangle, ray: &ray::Ray) -> f32 {
+    let c = triangle.v0 - ray.origin;
+    let r = ray.direction.cross(c);
+    let inverse = 1.0 / triangle.ng.dot(ray.direction);
+    let (u, v) = (r.dot(triangle.e2) * inverse, r.dot(triangle.e1) * inverse);
+    let distance = triangle.ng.dot(c) * inverse;
+    // All comparisons fail for NaN, which a ray in the triangle's own plane gives.
+    let inside = u >= -OVERLAP && v >= -OVERLAP && u + v <= 1.0 + OVERLAP;
+    if inside && distance >= ray.tmin && distance <= ray.tmax { distance } else { f32::INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use crate::scene::{Material, Triangle};
+    use glam::Vec3;
+
+    fn triangle(positions: [DVec3; 3], material: u32) -> Triangle {
+        let normal = (positions[1] - positions[0]).cross(positions[2] - positions[0]).normalize_or_zero().as_vec3();
+        Triangle {
+            positions: positions.map(|p| p.as_vec3()),
+            normals: [normal; 3],
+            texcoords: [[Vec2::ZERO, Vec2::ZERO], [Vec2::X, Vec2::X], [Vec2::Y, Vec2::Y]],
+            colors: [Vec3::ONE; 3],
+            material,
+            instance: 0,
+        }
+    }
+
+    fn soup(count: u64, seed: u64) -> Scene {
+        let mut random = Random::new(seed, 0);
+        let mut point = |scale: f64| DVec3::from_array(std::array::from_fn(|_| (random.uniform() - 0.5) * scale));
+        let triangles = (0..count)
+            .map(|i| {
+                let p = point(2.0);
+                triangle([p, p + point(0.4), p + point(0.4)], (i % 2) as u32)
+            })
+            .collect();
+        let double_sided = Material { double_sided: true, ..Material::diffuse(Vec3::ONE) };
+        Scene { triangles, materials: vec![Material::diffuse(Vec3::ONE), double_sided], ..Scene::default() }
+    }
+
+    /// Every triangle by itself, in double precision.
+    fn oracle(scene: &Scene, ray: &Ray, sides: Sides) -> Option<(u32, f64)> {
+        let mut nearest: Option<(u32, f64)> = None;
+        for (index, triangle) in scene.triangles.iter().enumerate() {
+            let ([a, b, c], n) = (triangle.corners(), triangle.cross());
+            let distance = n.dot(a - ray.origin) / n.dot(ray.direction);
+            let p = ray.at(distance);
+            let inside = [(a, b), (b, c), (c, a)].iter().all(|(p0, p1)| (*p1 - *p0).cross(p - *p0).dot(n) >= 0.0);
+            let back = n.dot(ray.direction) >= 0.0 && !scene.material(index as u32).double_sided;
+            let seen = distance > 0.0 && inside && !(back && sides == Sides::Front);
+            if seen && nearest.is_none_or(|(_, d)| distance < d) {
+                nearest = Some((index as u32, distance));
+            }
+        }
+        nearest
+    }
+
+    #[test]
+    fn hits_agree_with_every_triangle_by_itself() {
+        let scene = soup(700, 5);
+        let bvh = SceneBvh::new(&scene);
+        let mut random = Random::new(6, 0);
+        let mut hits = 0;
+        for _ in 0..4000 {
+            let mut draw = || DVec3::from_array(std::array::from_fn(|_| random.uniform() - 0.5));
+            let ray = Ray { origin: draw() * 3.0, direction: draw().normalize() };
+            for sides in [Sides::Front, Sides::Both] {
+                let found = bvh.nearest(&ray, 0.0, sides);
+                let expected = oracle(&scene, &ray, sides);
+                assert_eq!(found.map(|h| h.triangle), expected.map(|e| e.0), "{ray:?}");
+                if let (Some(hit), Some((_, distance))) = (found, expected) {
+                    hits += 1;
+                    assert!((hit.distance - distance).abs() < 1e-9 * (1.0 + distance));
+                    let there = scene.triangles[hit.triangle as usize].at(hit.barycentric);
+                    assert!((there - hit.position).length() < 1e-9, "barycentric weights lead elsewhere");
+                    // What is met stands in the way of a segment that reaches beyond it, and not of a shorter one.
+                    if sides == Sides::Both {
+                        assert!(bvh.occluded(ray.origin, ray.at(distance * 1.01)));
+                        assert!(!bvh.occluded(ray.origin, ray.at(distance * 0.99)));
+                    }
+                }
+            }
+        }
+        assert!(hits > 1000, "{hits} hits are too few to say anything");
+    }
+
+    #[test]
+    fn rays_along_axes_meet_walls_along_axes() {
+        // Rays with two zero components on flat boxes, through the shared diagonal of a square: the hard case for
+        // both the box test and the triangle test.
+        let mut triangles = Vec::new();
+        for axis in 0..3 {
+            for side in [0.0, 1.0] {
+                let (u, v) = (DVec3::AXES[(axis + 1) % 3], DVec3::AXES[(axis + 2) % 3]);
+                let a = DVec3::AXES[axis] * side;
+                triangles.push(triangle([a, a + u, a + u + v], 1));
+                triangles.push(triangle([a, a + u + v, a + v], 1));
+            }
+        }
+        let scene = Scene { triangles, ..soup(0, 0) };
+        let bvh = SceneBvh::new(&scene);
+        for axis in 0..3 {
+            for cell in 0..144 {
+                let mut origin = DVec3::ZERO;
+                origin[axis] = 0.5;
+                origin[(axis + 1) % 3] = (f64::from(cell % 12) + 0.5) / 12.0;
+                origin[(axis + 2) % 3] = (f64::from(cell / 12) + 0.5) / 12.0;
+                for direction in [DVec3::AXES[axis], -DVec3::AXES[axis]] {
+                    let hit = bvh.nearest(&Ray { origin, direction }, 0.0, Sides::Both);
+                    assert!(hit.is_some_and(|h| (h.distance - 0.5).abs() < 1e-9), "{origin} {direction} {hit:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_closed_box_lets_no_ray_out() {
+        let mut triangles = Vec::new();
+        for axis in 0..3 {
+            for side in [0.0, 2.0] {
+                let (u, v) = (DVec3::AXES[(axis + 1) % 3] * 2.0, DVec3::AXES[(axis + 2) % 3] * 2.0);
+                let a = DVec3::AXES[axis] * side;
+                triangles.push(triangle([a, a + u, a + u + v], 1));
+                triangles.push(triangle([a, a + u + v, a + v], 1));
+            }
+        }
+        let scene = Scene { triangles, ..soup(0, 0) };
+        let bvh = SceneBvh::new(&scene);
+        let mut random = Random::new(2, 0);
+        // From the middle, and from points ever nearer to a floor and two walls that meet it.
+        for near in [1.0, 1e-2, 1e-3, 1e-4, 2e-5] {
+            let lost = (0..20_000)
+                .filter(|_| {
+                    let origin = DVec3::new(
+                        near * random.uniform() + bvh.offset(),
+                        bvh.offset(),
+                        near * random.uniform() + bvh.offset(),
+                    );
+                    let mut d = DVec3::from_array(std::array::from_fn(|_| random.uniform() - 0.5)).normalize();
+                    d.y = d.y.abs();
+                    bvh.nearest(&Ray { origin, direction: d }, 0.0, Sides::Both).is_none()
+                })
+                .count();
+            assert_eq!(lost, 0, "of 20,000 rays from within {near} of a corner");
+        }
+    }
+
+    #[test]
+    fn eyes_pass_backs_and_light_does_not() {
+        let at = |z: f64| triangle([DVec3::new(-1.0, -1.0, z), DVec3::new(1.0, -1.0, z), DVec3::new(0.0, 1.0, z)], 0);
+        let scene =
+            Scene { triangles: vec![at(0.0)], materials: vec![Material::diffuse(Vec3::ONE)], ..Scene::default() };
+        let bvh = SceneBvh::new(&scene);
+        let from_behind = Ray { origin: DVec3::new(0.0, 0.0, -1.0), direction: DVec3::Z };
+        assert!(bvh.nearest(&from_behind, 0.0, Sides::Front).is_none());
+        assert!(bvh.nearest(&from_behind, 0.0, Sides::Both).is_some_and(|h| !h.front && h.distance == 1.0));
+        assert!(bvh.occluded(DVec3::NEG_Z, DVec3::Z));
+    }
+
+    #[test]
+    fn masked_material_has_holes() {
+        let mut scene = Scene { triangles: vec![], materials: vec![Material::diffuse(Vec3::ONE)], ..Scene::default() };
+        scene.triangles.push(triangle([DVec3::ZERO, DVec3::X, DVec3::Y], 0));
+        // Opaque where u < ½, a hole beyond.
+        let rgba = [255, 255, 255, 255, 255, 255, 255, 0];
+        let wrap = [crate::scene::texture::Wrap::ClampToEdge; 2];
+        scene.textures.push(crate::scene::Texture::from_rgba8("holes".into(), 2, 1, &rgba, true, wrap, false));
+        scene.materials[0].alpha_mode = AlphaMode::Mask(0.5);
+        scene.materials[0].base_color_texture = Some(crate::scene::TextureRef {
+            texture: 0,
+            texcoord: 0,
+            scale: Vec2::ONE,
+            rotation: 0.0,
+            offset: Vec2::ZERO,
+        });
+        let bvh = SceneBvh::new(&scene);
+        let down = |x: f64| Ray { origin: DVec3::new(x, 0.1, 1.0), direction: DVec3::NEG_Z };
+        assert!(bvh.nearest(&down(0.3), 0.0, Sides::Front).is_some());
+        assert!(bvh.nearest(&down(0.7), 0.0, Sides::Front).is_none());
+        assert!(!bvh.occluded(DVec3::new(0.7, 0.1, 1.0), DVec3::new(0.7, 0.1, -1.0)));
+    }
+
+    #[test]
+    fn slivers_and_broken_corners_meet_nothing() {
+        let broken = triangle([DVec3::ZERO, DVec3::X, DVec3::splat(f64::NAN)], 0);
+        let sliver = triangle([DVec3::ZERO, DVec3::X, DVec3::X * 2.0], 0);
+        let scene = Scene {
+            triangles: vec![broken, sliver],
+            materials: vec![Material::diffuse(Vec3::ONE)],
+            ..Scene::default()
+        };
+        let bvh = SceneBvh::new(&scene);
+        assert_eq!(bvh.triangle_count(), 0);
+        let ray = Ray { origin: DVec3::new(0.5, 0.0, 1.0), direction: DVec3::NEG_Z };
+        assert!(bvh.nearest(&ray, 0.0, Sides::Both).is_none() && !bvh.occluded(DVec3::Z, DVec3::NEG_Z));
+    }
+
+    #[test]
+    fn rays_leave_their_own_surface_at_any_scale() {
+        for scale in [1e-3, 1.0, 1e4] {
+            let corners = [DVec3::new(-1.0, -1.0, 0.3), DVec3::new(2.0, -1.0, 0.1), DVec3::new(0.0, 2.0, 0.2)];
+            let scene = Scene {
+                triangles: vec![triangle(corners.map(|p| (p + DVec3::new(3.0, 5.0, 1.0)) * scale), 1)],
+                ..soup(0, 0)
+            };
+            let bvh = SceneBvh::new(&scene);
+            let t = &scene.triangles[0];
+            let mut random = Random::new(1, 1);
+            for _ in 0..1000 {
+                let (v, w) = (0.5 * random.uniform(), 0.5 * random.uniform());
+                let direction = DVec3::from_array(std::array::from_fn(|_| random.uniform() - 0.5)).normalize();
+                let ray = Ray { origin: t.at([v, w]), direction };
+                assert!(bvh.nearest_leaving(&ray, t.normal(), Sides::Both).is_none(), "at scale {scale}");
+            }
+        }
+    }
 }

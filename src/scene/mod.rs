@@ -9,7 +9,7 @@ pub mod gltf;
 pub mod material;
 pub mod texture;
 
-pub use bvh::Ray;
+pub use bvh::{Hit, Ray, SceneBvh, Sides};
 pub use camera::{Camera, Projection};
 pub use material::{AlphaMode, Material, TextureRef};
 pub use texture::Texture;
@@ -37,6 +37,11 @@ impl Triangle {
     /// Corners in double precision [m]: exactly the stored ones.
     pub fn corners(&self) -> [DVec3; 3] {
         self.positions.map(|p| p.as_dvec3())
+    }
+    /// The point with the given weights of the second and third corner [m].
+    pub fn at(&self, barycentric: [f64; 2]) -> DVec3 {
+        let [a, b, c] = self.corners();
+        a + (b - a) * barycentric[0] + (c - a) * barycentric[1]
     }
     /// Twice the area times the unit normal [m²]; zero for a degenerate triangle.
     pub fn cross(&self) -> DVec3 {

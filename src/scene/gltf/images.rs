@@ -4,7 +4,7 @@ use super::document::Document;
 use super::resources::{MAX_FILE_BYTES, read_uri};
 use crate::error::Result;
 use crate::scene::Warning;
-use crate::scene::texture::{Texture, Wrap};
+use crate::scene::texture::{Level, Texture, Wrap};
 use gltf::json;
 use json::texture::{MagFilter, MinFilter, WrappingMode};
 use json::validation::Checked;
@@ -14,9 +14,16 @@ use std::io::Cursor;
 /// Largest side of a texture in texels; a larger image is halved until it fits, with a warning.
 pub const MAX_TEXTURE_SIDE: usize = 4096;
 
-/// Largest side of an image that is decoded at all, and most memory that its decoder may take [bytes].
+/// Texels of all textures together: 1.4 GB with their pyramids. Once they are spent, further textures are halved until
+/// they fit, though not below a side of 256, with a warning for each.
+pub const MAX_TEXELS: usize = 64 << 20;
+
+/// Side below which a texture is not halved to save memory [texels].
+const SPARED_SIDE: usize = 256;
+
+/// Largest side of an image that is decoded at all, and most memory that its decoder may take [bytes]: 8192 × 8192.
 const MAX_IMAGE_SIDE: u32 = 32_768;
-const MAX_DECODER_BYTES: u64 = 1 << 30;
+const MAX_DECODER_BYTES: u64 = 256 << 20;
 
 /// Textures decoded so far. The same image under two samplers, or as colour and as data, is two textures.
 #[derive(Default)]
@@ -90,7 +97,12 @@ impl Textures {
         let wrap = sampler.map_or([Wrap::Repeat; 2], |s| [wrap(s.wrap_s), wrap(s.wrap_t)]);
         let nearest = sampler.is_some_and(is_nearest);
         let mut texture = Texture::from_rgba8(name.clone(), width, height, picture.as_raw(), srgb, wrap, !nearest);
-        let too_fine = texture.levels.iter().take_while(|l| l.width.max(l.height) > MAX_TEXTURE_SIDE).count();
+        let spent: usize = self.decoded.iter().map(|t| t.levels[0].texels.len()).sum();
+        let fits = |level: &Level| {
+            let side = level.width.max(level.height);
+            side <= SPARED_SIDE || (side <= MAX_TEXTURE_SIDE && spent + level.texels.len() <= MAX_TEXELS)
+        };
+        let too_fine = texture.levels.iter().take_while(|level| !fits(level)).count();
         if too_fine > 0 {
             texture.levels.drain(..too_fine);
             let kept = &texture.levels[0];

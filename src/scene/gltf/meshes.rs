@@ -244,8 +244,7 @@ impl<'a> Placement<'a> {
         for (i, (&corner, transform)) in corners.iter().zip(&transforms).enumerate() {
             let vertex = corner as usize;
             let position = transform.world_from_mesh.transform_point3(primitive.position(vertex, weights));
-            // A comparison with NaN is false, so that this refuses NaN too.
-            if !(position.abs().max_element() <= MAX_COORDINATE) || position.is_nan() {
+            if !position.is_finite() || position.abs().max_element() > MAX_COORDINATE {
                 return Err(document.error(format!(
                     "{} puts a vertex at {position}; coordinates must be finite and within {MAX_COORDINATE:e} m",
                     name()

@@ -2,7 +2,7 @@
 //!
 //! Of that crate only the schema (`gltf::json`) is used. Its own validation and its accessor iterators panic on some
 //! malformed files, so every index is looked up here with a check, and every byte range is checked before it is read:
-//! a malformed file is an [`Error::Input`](crate::Error::Input) in one line that says what is wrong and where.
+//! a malformed file is an [`Error::Input`] in one line that says what is wrong and where.
 //!
 //! # What is read
 //!
@@ -19,7 +19,7 @@
 //!
 //! # Limits
 //!
-//! [`MAX_TRIANGLES`], [`MAX_COORDINATE`], [`MAX_TEXTURE_SIDE`], [`MAX_FILE_BYTES`].
+//! [`MAX_TRIANGLES`], [`MAX_COORDINATE`], [`MAX_TEXTURE_SIDE`], [`MAX_TEXELS`], [`MAX_FILE_BYTES`].
 
 mod accessor;
 mod animation;
@@ -34,7 +34,7 @@ mod primitives;
 mod resources;
 
 pub use document::UNDERSTOOD_EXTENSIONS;
-pub use images::MAX_TEXTURE_SIDE;
+pub use images::{MAX_TEXELS, MAX_TEXTURE_SIDE};
 pub use meshes::{MAX_COORDINATE, MAX_TRIANGLES};
 pub use resources::MAX_FILE_BYTES;
 

@@ -20,42 +20,37 @@ impl Nodes {
     pub(super) fn new(document: &Document, pose: &Pose, scene: Option<&Choice>) -> Result<Self> {
         let nodes = &document.root.nodes;
         let parents = parents(document)?;
-        let roots = (0..nodes.len()).filter(|&n| parents[n].is_none());
+        let roots = || (0..nodes.len()).filter(|&n| parents[n].is_none()).collect();
+        let twice = |node| {
+            let name = node_name(document, node);
+            document.error(format!("{name} stands twice in the scene; glTF requires a tree"))
+        };
+
+        let all = depth_first(nodes, roots()).map_err(twice)?;
+        // Each node has at most one parent, so that whatever no root reaches hangs on a ring.
+        if all.len() < nodes.len() {
+            return Err(document.error("its nodes form a ring (a node is its own ancestor); glTF requires a tree"));
+        }
         let mut world_from_node = vec![DMat4::IDENTITY; nodes.len()];
-        let mut reached = 0;
-        for node in depth_first(nodes, roots.collect()) {
+        for node in all {
             let above = parents[node].map_or(DMat4::IDENTITY, |parent| world_from_node[parent]);
             world_from_node[node] = above * pose.parent_from_node[node];
-            reached += 1;
             if !world_from_node[node].is_finite() {
                 return Err(document.error(format!("{} has a transform that is not finite", node_name(document, node))));
             }
         }
-        // Each node has at most one parent, so that whatever no root reaches hangs on a ring.
-        if reached < nodes.len() {
-            return Err(document.error("its nodes form a ring (a node is its own ancestor); glTF requires a tree"));
-        }
 
-        let shown = match chosen_scene(document, scene)? {
+        let tops = match chosen_scene(document, scene)? {
             Some(scene) => {
-                let mut tops = Vec::with_capacity(scene.nodes.len());
                 for &index in &scene.nodes {
                     document.get(index, "a scene's node list")?;
-                    tops.push(index.value());
                 }
-                let shown = depth_first(nodes, tops);
-                let mut seen = vec![false; nodes.len()];
-                for &node in &shown {
-                    if std::mem::replace(&mut seen[node], true) {
-                        let name = node_name(document, node);
-                        return Err(document.error(format!("the scene lists {name} twice; glTF requires a tree")));
-                    }
-                }
-                shown
+                scene.nodes.iter().map(json::Index::value).collect()
             }
             // A file without scenes is a library of parts; all of it is shown.
-            None => depth_first(nodes, (0..nodes.len()).filter(|&n| parents[n].is_none()).collect()),
+            None => roots(),
         };
+        let shown = depth_first(nodes, tops).map_err(twice)?;
         Ok(Self { world_from_node, shown })
     }
 }
@@ -83,17 +78,21 @@ fn parents(document: &Document) -> Result<Vec<Option<usize>>> {
     Ok(parents)
 }
 
-/// Nodes under `tops`, parents before children. Children are known to exist and to have one parent each, so that the
-/// walk ends; it keeps its own stack, so that a deep tree cannot overflow the thread's.
-fn depth_first(nodes: &[json::Node], tops: Vec<usize>) -> Vec<usize> {
+/// Nodes under `tops`, parents before children; the error is a node that was met twice. All children are known to
+/// exist. The walk keeps its own stack, so that a deep tree cannot overflow the thread's.
+fn depth_first(nodes: &[json::Node], tops: Vec<usize>) -> std::result::Result<Vec<usize>, usize> {
     let mut stack = tops;
     stack.reverse();
+    let mut seen = vec![false; nodes.len()];
     let mut order = Vec::with_capacity(nodes.len());
     while let Some(node) = stack.pop() {
+        if std::mem::replace(&mut seen[node], true) {
+            return Err(node);
+        }
         order.push(node);
         stack.extend(nodes[node].children.iter().flatten().rev().map(json::Index::value));
     }
-    order
+    Ok(order)
 }
 
 fn chosen_scene<'a>(document: &'a Document, scene: Option<&Choice>) -> Result<Option<&'a json::Scene>> {

@@ -1,0 +1,435 @@
+//! Flags as they are typed.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use holodrive::units;
+use std::path::PathBuf;
+
+const EXIT_CODES: &str = "\
+Exit codes: 0 done; 2 wrong flags, bad input, or a file or display that refused (one line says what, where and what to do; \
+nothing is written under a final name); 130 interrupted.";
+
+/// From a glTF room to light on a panel: holograms for spatial light modulators.
+#[derive(Debug, Parser)]
+#[command(name = "holodrive", version, after_help = EXIT_CODES, max_term_width = 120)]
+pub(crate) struct Cli {
+    /// Print the report as JSON on standard output, for machines.
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// The steps, one by one, and `show`, which does them all.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Light a scene and trace it into point sources.
+    #[command(
+        after_help = "Examples:\n  holodrive points scenes/cornell.gltf -o points.ply\n  holodrive points room.glb -o world.ply --frame world --picture traced.npy --rays 800x600"
+    )]
+    Points(PointsArgs),
+    /// Compute the field of a scene, point cloud, or picture with depth on the panel.
+    #[command(
+        after_help = "Examples:\n  holodrive compute points.ply -o field.npy\n  holodrive compute rgb.png+depth.png --panel holoeye-pluto-2.1 --wavelength 532nm -o field.npy"
+    )]
+    Compute(ComputeArgs),
+    /// Carry a field from its plane to another.
+    #[command(
+        after_help = "Example:\n  holodrive propagate field.npy --pitch 8um --wavelength 532nm --distance 0.5m -o out.npy"
+    )]
+    Propagate(PropagateArgs),
+    /// Encode a field as a frame of drive levels for a panel.
+    #[command(after_help = "Example:\n  holodrive encode field.npy --method double-phase -o frame.png")]
+    Encode(EncodeArgs),
+    /// Reconstruct what is seen of a frame or a field: on a plane, or through an eye.
+    #[command(
+        after_help = "Examples:\n  holodrive reconstruct frame.png --distance 120mm -o near.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus 150mm --pupil 4mm -o eye.png"
+    )]
+    Reconstruct(ReconstructArgs),
+    /// The whole way: scene, points, field or frame → pictures on the simulated panel, or light on a real one.
+    #[command(
+        after_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO"
+    )]
+    Show(ShowArgs),
+    /// List the monitors, and which panel profile fits each.
+    Monitors(MonitorsArgs),
+}
+
+/// Which panel.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct PanelArgs {
+    /// Panel profile: a name from calib/ or a TOML file.
+    #[arg(long, default_value = "generic", value_name = "PROFILE")]
+    pub(crate) panel: String,
+    /// Vacuum wavelength, with its unit [default: the panel's first].
+    #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
+    pub(crate) wavelength: Option<f64>,
+}
+
+/// How a scene is lit and traced.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct SceneArgs {
+    /// Rays across and down.
+    #[arg(long, default_value = "500x500", value_parser = size, value_name = "WxH")]
+    pub(crate) rays: (usize, usize),
+    /// Camera of the scene, by name or number [default: the first].
+    #[arg(long, value_name = "NAME")]
+    pub(crate) camera: Option<String>,
+    /// Animation clip, by name or number.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) animation: Option<String>,
+    /// Time in the animation [s].
+    #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
+    pub(crate) time: f64,
+    /// Form factors: exact (1/π, polygons), or the seed paper's eq. (1) for comparison (half of the light is lost).
+    #[arg(long, value_enum, default_value_t = FormFactorArg::Exact)]
+    pub(crate) form_factor: FormFactorArg,
+    /// Most mirror reflections along a ray.
+    #[arg(long, default_value_t = 8, value_name = "N")]
+    pub(crate) bounces: u32,
+    /// Seed of all random numbers.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub(crate) seed: u64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FormFactorArg {
+    Exact,
+    Paper,
+}
+
+/// Where the scene stands before the panel.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct PlacementArgs {
+    /// window: the camera's picture seen through the panel; model: the scene as a miniature.
+    #[arg(long, value_enum, default_value_t = PlacementArg::Window)]
+    pub(crate) placement: PlacementArg,
+    /// Distance of the viewer's eye in front of the panel.
+    #[arg(long, default_value = "600mm", value_parser = units::positive_length, value_name = "LENGTH")]
+    pub(crate) viewer: f64,
+    /// window: how far behind the panel the nearest point stands (negative: in front).
+    #[arg(long, default_value = "100mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) near: f64,
+    /// window: how far behind the panel the farthest point stands.
+    #[arg(long, default_value = "150mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) far: f64,
+    /// model: how far behind the panel the scene's middle stands (negative: in front).
+    #[arg(long, default_value = "150mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) distance: f64,
+    /// model: metres at the panel for one metre of the scene [default: fits the view].
+    #[arg(long, value_name = "FACTOR")]
+    pub(crate) scale: Option<f64>,
+    /// Initial phase of the points.
+    #[arg(long, value_enum, default_value_t = PhaseArg::Random)]
+    pub(crate) phase: PhaseArg,
+    /// Clip light brighter than white: auto (a quarter above what 97 % of the lit pixels do not pass), none, or a
+    /// radiance [default: none for `points`, auto otherwise].
+    #[arg(long, value_parser = white, value_name = "WHITE")]
+    pub(crate) white: Option<White>,
+    /// Depth map of a picture: which end of its gray scale is near.
+    #[arg(long, value_enum, default_value_t = DepthArg::WhiteNear)]
+    pub(crate) depth_scale: DepthArg,
+}
+
+/// What is clipped as white.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum White {
+    Auto,
+    None,
+    At(f32),
+}
+
+fn white(text: &str) -> Result<White, String> {
+    match text {
+        "auto" => Ok(White::Auto),
+        "none" => Ok(White::None),
+        value => value.parse().map(White::At).map_err(|_| format!("`{value}` is not auto, none or a radiance")),
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PlacementArg {
+    Window,
+    Model,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PhaseArg {
+    Zero,
+    Random,
+    Path,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DepthArg {
+    WhiteNear,
+    BlackNear,
+}
+
+/// Which light of a coloured cloud makes the hologram.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ChannelArg {
+    Luminance,
+    Red,
+    Green,
+    Blue,
+}
+
+/// How the field is computed.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct HologramArgs {
+    /// Engine [default: the planner chooses].
+    #[arg(long = "engine", value_enum, value_name = "NAME")]
+    pub(crate) engine: Option<EngineArg>,
+    /// Largest relative L2 error of the field.
+    #[arg(long, default_value_t = 1e-3, value_name = "ERROR")]
+    pub(crate) error: f64,
+    /// Which light of a coloured cloud.
+    #[arg(long, value_enum, default_value_t = ChannelArg::Luminance)]
+    pub(crate) channel: ChannelArg,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum EngineArg {
+    Oracle,
+    Direct,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FrameArg {
+    /// Metres from the panel's middle: ready for a hologram.
+    Hologram,
+    /// The scene's own metres.
+    World,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct PointsArgs {
+    /// A .gltf or .glb file.
+    pub(crate) scene: PathBuf,
+    /// The point cloud to write.
+    #[arg(short, long, default_value = "points.ply", value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    /// Also write the traced picture: .npy (H×W×3 float32 linear radiance) or .png.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) picture: Option<PathBuf>,
+    /// Frame of the positions.
+    #[arg(long, value_enum, default_value_t = FrameArg::Hologram)]
+    pub(crate) frame: FrameArg,
+    #[command(flatten)]
+    pub(crate) panel: PanelArgs,
+    #[command(flatten)]
+    pub(crate) light: SceneArgs,
+    #[command(flatten)]
+    pub(crate) placement: PlacementArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ComputeArgs {
+    /// A scene (.gltf, .glb), a point cloud (.ply), or a picture with its depth map (rgb.png+depth.png).
+    pub(crate) input: PathBuf,
+    /// The field to write (H×W complex64, metadata beside it).
+    #[arg(short, long, default_value = "field.npy", value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) panel: PanelArgs,
+    #[command(flatten)]
+    pub(crate) light: SceneArgs,
+    #[command(flatten)]
+    pub(crate) placement: PlacementArgs,
+    #[command(flatten)]
+    pub(crate) hologram: HologramArgs,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum KernelArg {
+    AngularSpectrum,
+    Fresnel,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct PropagateArgs {
+    /// The field (.npy).
+    pub(crate) input: PathBuf,
+    /// The field to write.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    /// How far, with the light (negative: back).
+    #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) distance: f64,
+    /// Pixel pitch; one length, or x,y [default: what stands beside the field].
+    #[arg(long, value_parser = pitch, value_name = "LENGTH[,LENGTH]")]
+    pub(crate) pitch: Option<[f64; 2]>,
+    /// Vacuum wavelength [default: what stands beside the field].
+    #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
+    pub(crate) wavelength: Option<f64>,
+    /// Wave equation.
+    #[arg(long, value_enum, default_value_t = KernelArg::AngularSpectrum)]
+    pub(crate) kernel: KernelArg,
+    /// Take pitch and wavelength from this panel profile.
+    #[arg(long, value_name = "PROFILE")]
+    pub(crate) panel: Option<String>,
+}
+
+#[derive(Clone, Debug, Args)]
+pub(crate) struct EncodingArgs {
+    /// Encoding [default: double-phase on a phase panel, off-axis-bipolar on an amplitude panel].
+    #[arg(long = "method", value_enum, value_name = "NAME")]
+    pub(crate) encoding: Option<EncodingArg>,
+    /// Off-axis: angle of the reference wave, x or x,y.
+    #[arg(long, value_parser = angles, value_name = "ANGLE[,ANGLE]", allow_hyphen_values = true)]
+    pub(crate) reference_angle: Option<[f64; 2]>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum EncodingArg {
+    DoublePhase,
+    Kinoform,
+    OffAxisBipolar,
+    OffAxisIntensity,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EncodeArgs {
+    /// The field (.npy).
+    pub(crate) input: PathBuf,
+    /// The frame to write.
+    #[arg(short, long, default_value = "frame.png", value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) panel: PanelArgs,
+    #[command(flatten)]
+    pub(crate) encoding: EncodingArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ReconstructArgs {
+    /// A frame (.png, .bmp) or a field (.npy).
+    pub(crate) input: PathBuf,
+    /// The picture to write: .png (8 bit, sRGB-coded) or .npy (H×W float32, linear intensity).
+    #[arg(short, long, default_value = "picture.png", value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    /// Panel profile [default: what the file says, else generic].
+    #[arg(long, value_name = "PROFILE")]
+    pub(crate) panel: Option<String>,
+    /// Vacuum wavelength [default: what the file says, else the panel's].
+    #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
+    pub(crate) wavelength: Option<f64>,
+    /// Plane in focus, from the panel: +250mm in front, -250mm behind; without a sign the side where the file says that
+    /// its content stands, else in front.
+    #[arg(
+        long,
+        value_name = "LENGTH",
+        allow_hyphen_values = true,
+        required_unless_present = "eye",
+        conflicts_with = "eye"
+    )]
+    pub(crate) distance: Option<String>,
+    /// Look through an eye or camera at x,y,z (hologram frame, z in front of the panel).
+    #[arg(long, value_parser = position, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "focus")]
+    pub(crate) eye: Option<[f64; 3]>,
+    /// Depth that the eye focuses on, from the panel, signed as --distance.
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) focus: Option<String>,
+    /// Diameter of the eye's pupil.
+    #[arg(long, default_value = "4mm", value_parser = units::positive_length, value_name = "LENGTH")]
+    pub(crate) pupil: f64,
+    /// Pixels of the picture [default: one for each sample of the field].
+    #[arg(long, value_parser = size, value_name = "WxH")]
+    pub(crate) size: Option<(usize, usize)>,
+    /// Half width and half height of the view on the plane in focus [default: the panel's, widened as the eye sees it].
+    #[arg(long, value_parser = pitch, value_name = "LENGTH[,LENGTH]")]
+    pub(crate) half: Option<[f64; 2]>,
+    /// Part of the pixels that is not shown brighter than white.
+    #[arg(long, default_value_t = 0.995, value_name = "PART")]
+    pub(crate) white: f64,
+    /// Block the zero order within this angle of the axis, where the encoding's Fourier stop stands; 0deg lets it pass.
+    #[arg(long, default_value = "0.05deg", value_parser = units::angle, value_name = "ANGLE")]
+    pub(crate) zero_order_stop: f64,
+    /// Samples per pixel and side of the simulated panel: 1, or more to see replica orders.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub(crate) subpixels: usize,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PresenterArg {
+    Auto,
+    Gpu,
+    Software,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ShowArgs {
+    /// A scene, a point cloud, a picture with depth (rgb.png+depth.png), a field, or a frame.
+    pub(crate) input: PathBuf,
+    /// Folder for pictures and data.
+    #[arg(short, long, default_value = "holodrive-out", value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Show the frame fullscreen on this monitor (see `holodrive monitors`) instead of the simulated panel.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) monitor: Option<String>,
+    /// How long to show it, in seconds [default: until Esc].
+    #[arg(long, value_name = "SECONDS")]
+    pub(crate) hold: Option<f64>,
+    /// Block the zero order within this angle of the axis, where the encoding's Fourier stop stands; 0deg lets it pass.
+    #[arg(long, default_value = "0.05deg", value_parser = units::angle, value_name = "ANGLE")]
+    pub(crate) zero_order_stop: f64,
+    /// What brings the levels to the screen.
+    #[arg(long, value_enum, default_value_t = PresenterArg::Auto)]
+    pub(crate) present: PresenterArg,
+    #[command(flatten)]
+    pub(crate) panel: PanelArgs,
+    #[command(flatten)]
+    pub(crate) light: SceneArgs,
+    #[command(flatten)]
+    pub(crate) placement: PlacementArgs,
+    #[command(flatten)]
+    pub(crate) hologram: HologramArgs,
+    #[command(flatten)]
+    pub(crate) encoding: EncodingArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct MonitorsArgs {
+    /// Also write the list to this file, as JSON.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Say whether this panel profile fits.
+    #[arg(long, value_name = "PROFILE")]
+    pub(crate) panel: Option<String>,
+}
+
+fn size(text: &str) -> Result<(usize, usize), String> {
+    let wrong = || format!("`{text}` is not a size such as 500x500");
+    let (width, height) = text.split_once(['x', '×']).ok_or_else(wrong)?;
+    let side = |t: &str| t.trim().parse::<usize>().ok().filter(|n| (1..=65_536).contains(n));
+    match (side(width), side(height)) {
+        (Some(width), Some(height)) => Ok((width, height)),
+        _ => Err(format!("{}; each side 1 to 65536", wrong())),
+    }
+}
+
+fn pitch(text: &str) -> Result<[f64; 2], String> {
+    pair(text, |t| units::positive_length(t).map_err(|e| e.to_string()))
+}
+
+fn angles(text: &str) -> Result<[f64; 2], String> {
+    let angle = |t: &str| units::angle(t).map_err(|e| e.to_string());
+    match text.split_once(',') {
+        Some((x, y)) => Ok([angle(x)?, angle(y)?]),
+        None => Ok([angle(text)?, 0.0]),
+    }
+}
+
+fn pair(text: &str, one: impl Fn(&str) -> Result<f64, String>) -> Result<[f64; 2], String> {
+    match text.split_once(',') {
+        Some((x, y)) => Ok([one(x)?, one(y)?]),
+        None => one(text).map(|v| [v, v]),
+    }
+}
+
+fn position(text: &str) -> Result<[f64; 3], String> {
+    let parts: Vec<f64> =
+        text.split(',').map(units::length).collect::<holodrive::Result<_>>().map_err(|e| e.to_string())?;
+    <[f64; 3]>::try_from(parts).map_err(|_| format!("`{text}` is not x,y,z such as 0mm,0mm,600mm"))
+}

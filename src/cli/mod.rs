@@ -1,0 +1,60 @@
+//! The command line: what was typed becomes settings, what was done becomes lines or JSON.
+
+mod args;
+mod bar;
+mod commands;
+mod report;
+#[cfg(feature = "display")]
+mod screen;
+mod show;
+
+use args::{Cli, Command};
+use clap::Parser;
+use clap::error::ErrorKind;
+use holodrive::Error;
+use std::process::ExitCode;
+
+/// Parses, runs and maps the outcome to an exit code: 0 done, 2 bad flags or input, 130 interrupted.
+pub(crate) fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(refused) if matches!(refused.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+            // Help into a closed pipe (`holodrive --help | head -1`) is no failure.
+            let _ = refused.print();
+            return ExitCode::SUCCESS;
+        }
+        Err(refused) => {
+            eprintln!("{}", one_line(&refused));
+            return ExitCode::from(2);
+        }
+    };
+    let json = cli.json;
+    let outcome = match cli.command {
+        Command::Points(args) => commands::points(&args),
+        Command::Compute(args) => commands::compute(&args),
+        Command::Propagate(args) => commands::propagate(&args),
+        Command::Encode(args) => commands::encode(&args),
+        Command::Reconstruct(args) => commands::reconstruct(&args),
+        Command::Show(args) => show::show(&args),
+        Command::Monitors(args) => commands::monitors(&args),
+    };
+    match outcome.and_then(|report| report.print(json)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("holodrive: {error}");
+            ExitCode::from(if matches!(error, Error::Interrupted) { 130 } else { 2 })
+        }
+    }
+}
+
+/// clap's own words without its layout: the first paragraph, and where the help is.
+fn one_line(refused: &clap::Error) -> String {
+    let text = refused.to_string();
+    let first: Vec<&str> = text.lines().take_while(|l| !l.trim().is_empty()).map(str::trim).collect();
+    let words = first.join(" ");
+    let words = words.strip_prefix("error: ").unwrap_or(&words);
+    if refused.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        return "holodrive: a command is needed: points, compute, propagate, encode, reconstruct, show or monitors (see holodrive --help)".into();
+    }
+    format!("holodrive: {words} (see holodrive --help)")
+}

@@ -1,0 +1,74 @@
+//! A frame on a real monitor.
+
+use super::args::{PresenterArg, ShowArgs};
+use super::report::{Report, seconds};
+use holodrive::display::{
+    self, Display, DisplayFrame, MonitorChoice, OnAbsence, Presenter, ShowEnd, ShowSettings, WindowSettings,
+};
+use holodrive::panel::Frame;
+use holodrive::progress::Progress;
+use holodrive::{Error, Result};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// The monitor that the user named, found.
+pub(super) struct Screen {
+    display: Display,
+    choice: MonitorChoice,
+}
+
+impl Screen {
+    /// Finds it among those that are there.
+    pub(super) fn find(name: &str) -> Result<Self> {
+        let choice: MonitorChoice = name.parse()?;
+        let mut display = Display::connect()?;
+        choice.find(&display.monitors()?)?;
+        Ok(Self { display, choice })
+    }
+
+    /// Shows the frame as the panel's packing says, until the time is over, Esc, or Ctrl-C.
+    pub(super) fn show(
+        mut self,
+        frame: &Frame,
+        args: &ShowArgs,
+        progress: &Arc<Progress>,
+        report: &mut Report,
+    ) -> Result<()> {
+        let hold = match args.hold {
+            Some(hold) if hold.is_finite() && (0.0..1e9).contains(&hold) => Some(Duration::from_secs_f64(hold)),
+            Some(hold) => return Err(Error::parameter("hold", format!("{hold} is not a number of seconds"))),
+            None => None,
+        };
+        let signal = frame.metadata.panel.signal.pack(&[frame])?;
+        let pixels = signal.rgb.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+        let picture = DisplayFrame::from_rgb(signal.width as u32, signal.height as u32, pixels)?;
+        let presenter = match args.present {
+            PresenterArg::Auto => Presenter::Auto,
+            PresenterArg::Gpu => Presenter::Gpu,
+            PresenterArg::Software => Presenter::Software,
+        };
+        let settings = ShowSettings {
+            monitor: self.choice.clone(),
+            window: WindowSettings { presenter, ..WindowSettings::default() },
+            hold,
+            on_absence: OnAbsence::End,
+        };
+        let shown = display::show(&mut self.display, picture, &settings, progress)?;
+        report.warn(shown.warnings.iter());
+        report.add_serialised(
+            "display",
+            &shown,
+            format!(
+                "shown on {} by {} for {}; first frame after {}",
+                shown.monitor.name,
+                shown.adapter.as_deref().unwrap_or("the processor"),
+                seconds(shown.shown),
+                seconds(shown.first_presented)
+            ),
+        );
+        match shown.end {
+            ShowEnd::Absent { why } => Err(Error::Display { what: why }),
+            ShowEnd::Held | ShowEnd::Closed | ShowEnd::Stopped => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! `show`: the whole way, with its pictures and data in one folder.
+
+use super::args::{ShowArgs, White};
+use super::bar::Bar;
+use super::commands::{
+    self, Input, Panel, Points, channel, content, encode_field, hologram_settings, load_points, luminance_picture,
+    origin, report_field, seen_half, white_of, write_traced, write_view,
+};
+use super::report::{Report, count, seconds};
+use glam::DVec2;
+use holodrive::field::Field;
+use holodrive::field::npy::{self, Content};
+use holodrive::panel::simulated::Simulation;
+use holodrive::panel::{Frame, Origin};
+use holodrive::pipeline::{self, Lit};
+use holodrive::points::ply;
+use holodrive::progress::Progress;
+use holodrive::reconstruction::{self, Picture, Scale, View, ViewSettings, metrics};
+use holodrive::units::show_length;
+use holodrive::{Result, files};
+use std::path::Path;
+use std::time::Instant;
+
+/// Runs the whole way; a folder that was made for nothing is taken away again.
+pub(super) fn show(args: &ShowArgs) -> Result<Report> {
+    let new = !args.output.exists();
+    let outcome = run(args);
+    if new && outcome.is_err() {
+        // Only an empty folder goes; one with results in it stays.
+        let _ = std::fs::remove_dir(&args.output);
+    }
+    outcome
+}
+
+fn run(args: &ShowArgs) -> Result<Report> {
+    let begin = Instant::now();
+    let mut report = Report::new("show");
+    let source = commands::input(&args.input)?;
+    let panel = commands::panel(&args.panel, &mut report)?;
+    let out = &args.output;
+    #[cfg(not(feature = "display"))]
+    if args.monitor.is_some() {
+        return Err(holodrive::Error::unsupported(
+            "this build has no display; build it with the feature `display` (the default)",
+        ));
+    }
+    // A monitor that is not there is found out before the work, not after it.
+    #[cfg(feature = "display")]
+    let screen = args.monitor.as_deref().map(super::screen::Screen::find).transpose()?;
+    files::output_folder(out)?;
+    let bar = Bar::new();
+    let (frame, lit, content) = match &source {
+        Input::Frame(path) => {
+            let profile = Some(&panel.profile).filter(|_| args.panel.panel != "generic");
+            let (frame, warnings) = match Frame::read(path, profile, args.panel.wavelength) {
+                // A foreign picture has no metadata: it is read for the default panel.
+                Err(_) if profile.is_none() => Frame::read(path, Some(&panel.profile), args.panel.wavelength)?,
+                other => other?,
+            };
+            report.warn(warnings);
+            let content = Content { depth: frame.metadata.origin.depth, ..Content::default() };
+            (frame, None, content)
+        }
+        Input::Field(path) => {
+            let pitch = [panel.grid.pitch_x, panel.grid.pitch_y];
+            let wavelength = args.panel.wavelength.or(npy::read_metadata(path)?.map(|m| m.wavelength));
+            let (field, metadata) = npy::read_field(path, Some(pitch), wavelength.or(Some(panel.wavelength)))?;
+            let frame = encode(args, &panel, &field, &metadata.content, &bar.progress, &mut report)?;
+            (frame, None, metadata.content)
+        }
+        _ => {
+            let points =
+                load_points(&source, (&args.light, &args.placement, White::Auto), &panel, &bar.progress, &mut report)?;
+            write_points(out, &points, &mut report)?;
+            let settings = hologram_settings(&args.hologram);
+            let computed = pipeline::field(
+                &points.cloud,
+                channel(&args.hologram),
+                &panel.grid,
+                panel.wavelength,
+                &settings,
+                &bar.progress,
+            )?;
+            report_field(&computed, &mut report);
+            let content = content(&points.cloud, &points.metadata);
+            npy::write_field(&out.join("field.npy"), &computed.field, &content, &origin(&args.input, &points.cloud))?;
+            let frame = encode(args, &panel, &computed.field, &content, &bar.progress, &mut report)?;
+            (frame, points.lit, content)
+        }
+    };
+    let to_frame = begin.elapsed().as_secs_f64();
+    report.add("to_frame_seconds", to_frame, format!("to the frame {:>8}", seconds(to_frame)));
+    #[cfg(feature = "display")]
+    if let Some(screen) = screen {
+        bar.progress.start("", 0);
+        screen.show(&frame, args, &bar.progress, &mut report)?;
+        return finish(report, out);
+    }
+    look(&frame, lit.as_ref(), &content, args, &bar.progress, &mut report)?;
+    drop(bar);
+    let total = begin.elapsed().as_secs_f64();
+    report.add("seconds", total, format!("in all       {:>8}", seconds(total)));
+    finish(report, out)
+}
+
+fn finish(mut report: Report, out: &Path) -> Result<Report> {
+    report.add("output", out.display().to_string(), format!("pictures and data in {}", out.display()));
+    let text = serde_json::to_string_pretty(&report.json()).unwrap_or_default();
+    files::write_bytes(&out.join("report.json"), text.as_bytes())?;
+    Ok(report)
+}
+
+fn write_points(out: &Path, points: &Points, report: &mut Report) -> Result<()> {
+    ply::write(&out.join("points.ply"), &points.cloud, &points.metadata)?;
+    if let Some(lit) = &points.lit {
+        write_traced(&out.join("traced.png"), lit)?;
+        report.add_serialised("focus", &lit.view.focus, "");
+    }
+    Ok(())
+}
+
+fn encode(
+    args: &ShowArgs,
+    panel: &Panel,
+    field: &Field,
+    content: &Content,
+    progress: &Progress,
+    report: &mut Report,
+) -> Result<Frame> {
+    let origin = Origin { source: Some(args.input.display().to_string()), depth: content.depth, ..Origin::default() };
+    let frame = encode_field(field, &args.encoding, panel, &origin, progress, report)?;
+    frame.write(&args.output.join("frame.png"))?;
+    Ok(frame)
+}
+
+/// Reconstructions of the simulated panel's light, and how like the traced picture they are.
+fn look(
+    frame: &Frame,
+    lit: Option<&Lit>,
+    content: &Content,
+    args: &ShowArgs,
+    progress: &Progress,
+    report: &mut Report,
+) -> Result<()> {
+    let (begin, out) = (Instant::now(), &args.output);
+    let (field, mut settings) = pipeline::simulated_light(frame, &Simulation::default(), progress)?;
+    settings.block_zero_order(args.zero_order_stop, field.wavelength);
+    let Some(lit) = lit else {
+        for (name, z) in planes_of(content) {
+            let view = View::Plane { z };
+            let half = seen_half(&field, &view, content.eye);
+            let (grid, values) = reconstruction::intensity(&field, &view, half, &settings, progress)?;
+            let picture = Picture { width: grid.width, height: grid.height, values };
+            write_view(
+                &out.join(format!("reconstruction-{name}.png")),
+                &picture,
+                Scale::Percentile(0.995),
+                &view,
+                half,
+            )?;
+        }
+        let elapsed = begin.elapsed().as_secs_f64();
+        report.add("reconstruction_seconds", elapsed, format!("pictures     {:>8}", seconds(elapsed)));
+        return Ok(());
+    };
+    let size = (lit.view.width, lit.view.height);
+    let placing = &lit.view.placing;
+    let half_at = |z: f64| placing.view_at(z);
+    let target = luminance_picture(lit);
+    let white = white_of(lit);
+
+    let step = focus_step(&field, &settings, half_at(content.depth.map_or(0.0, |d| d[0])), size);
+    let (sharp, planes) =
+        reconstruction::all_in_focus(&field, &lit.view.depths, size, half_at, step, &settings, progress)?;
+    let likeness = metrics::likeness(&sharp, &target, white);
+    // One gain for all pictures of one frame: what is bright in one is as bright in the others.
+    let scale = if likeness.gain > 0.0 {
+        Scale::White((f64::from(white) / likeness.gain) as f32)
+    } else {
+        Scale::Percentile(0.995)
+    };
+    let write = |name: &str, picture: &Picture, view: &View| {
+        let path = out.join(format!("reconstruction-{name}.png"));
+        write_view(&path, picture, scale, view, half_at(view.focus()))
+    };
+    write("sharp", &sharp, &View::Plane { z: content.depth.map_or(0.0, |d| d[0]) })?;
+    for (name, z) in &lit.view.focus {
+        progress.start(&format!("focus {name}"), 0);
+        let view = View::Plane { z: *z };
+        let seen = reconstruction::picture(&field, &view, half_at(*z), size, &settings, progress)?;
+        write(name, &seen, &view)?;
+        report.add(&format!("focus_{name}"), *z, format!("focus on {name}: {} behind the panel", show_length(-z)));
+    }
+    if let Some((_, focus)) = lit.view.focus.first() {
+        let view = View::Eye { position: placing.eye.to_array(), pupil: 4e-3, focus: *focus };
+        let seen = reconstruction::picture(&field, &view, half_at(*focus), size, &settings, progress)?;
+        let own = metrics::likeness(&seen, &target, white);
+        let scale = Scale::White((f64::from(white) / own.gain.max(f64::MIN_POSITIVE)) as f32);
+        write_view(&out.join("reconstruction-eye.png"), &seen, scale, &view, half_at(*focus))?;
+    }
+    let elapsed = begin.elapsed().as_secs_f64();
+    report.add_serialised(
+        "likeness",
+        &likeness,
+        format!(
+            "simulated reconstruction, all in focus from {} planes, against the traced picture: PSNR {:.1} dB, SSIM {:.3}; on 5 × 5 blocks {:.1} dB",
+            count(planes),
+            likeness.psnr,
+            likeness.ssim,
+            likeness.psnr_blocks
+        ),
+    );
+    report.add("reconstruction_seconds", elapsed, format!("pictures     {:>8}", seconds(elapsed)));
+    Ok(())
+}
+
+/// Planes to look at when nothing but the depth range is known.
+fn planes_of(content: &Content) -> Vec<(&'static str, f64)> {
+    match content.depth {
+        Some([near, far]) if (near - far).abs() > 1e-6 => {
+            vec![("near", near), ("middle", 0.5 * (near + far)), ("far", far)]
+        }
+        Some([near, _]) => vec![("near", near)],
+        None => vec![("panel", 0.0)],
+    }
+}
+
+/// Distance of planes at which defocus blurs by at most one cell of the picture between them: cell / tan θ, with θ the
+/// half angle of the light's cone, sin θ = λ·f_max.
+fn focus_step(field: &Field, settings: &ViewSettings, half: DVec2, size: (usize, usize)) -> f64 {
+    let cell = (2.0 * half.x / size.0 as f64).min(2.0 * half.y / size.1 as f64);
+    let frequency = settings.aperture.map_or(field.grid.limit_x(), |a| a.half[0].max(a.half[1]));
+    let sine = (field.wavelength * frequency).clamp(1e-6, 0.9);
+    cell / (sine / (1.0 - sine * sine).sqrt())
+}

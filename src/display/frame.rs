@@ -1,0 +1,81 @@
+//! The frame as it leaves for the monitor: packed 8-bit RGB video pixels.
+
+use crate::error::{Error, Result};
+
+/// One video frame: 8-bit RGB, row-major, row 0 on top, exactly the monitor's size.
+///
+/// How drive levels (8 or 10 bits, one panel or three by colour) are packed into video pixels is the panel's matter; a
+/// frame is shown as it is, bit for bit, without gamma, blending or scaling.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DisplayFrame {
+    width: u32,
+    height: u32,
+    pixels: Vec<[u8; 3]>,
+}
+
+impl DisplayFrame {
+    /// A frame of packed RGB pixels.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] when a side is zero or `pixels` does not hold `width × height` of them.
+    pub fn from_rgb(width: u32, height: u32, pixels: Vec<[u8; 3]>) -> Result<Self> {
+        Self::check(width, height, pixels.len())?;
+        Ok(Self { width, height, pixels })
+    }
+
+    /// A frame whose three channels carry the same level.
+    ///
+    /// # Errors
+    ///
+    /// As [`DisplayFrame::from_rgb`].
+    pub fn from_gray(width: u32, height: u32, levels: &[u8]) -> Result<Self> {
+        Self::check(width, height, levels.len())?;
+        Ok(Self { width, height, pixels: levels.iter().map(|&level| [level; 3]).collect() })
+    }
+
+    /// Width [px].
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height [px].
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// The pixels, row-major, row 0 on top.
+    pub fn pixels(&self) -> &[[u8; 3]] {
+        &self.pixels
+    }
+
+    fn check(width: u32, height: u32, given: usize) -> Result<()> {
+        if width == 0 || height == 0 {
+            return Err(Error::parameter("frame", format!("{width}x{height} px has no pixels")));
+        }
+        if u64::from(width) * u64::from(height) != given as u64 {
+            return Err(Error::parameter("frame", format!("{given} pixels given for a frame of {width}x{height}")));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gray_levels_go_to_all_three_channels() {
+        let frame = DisplayFrame::from_gray(3, 2, &[0, 1, 2, 253, 254, 255]).expect("frame");
+        assert_eq!(frame.pixels(), &[[0; 3], [1; 3], [2; 3], [253; 3], [254; 3], [255; 3]]);
+        assert_eq!((frame.width(), frame.height()), (3, 2));
+    }
+
+    #[test]
+    fn a_frame_with_too_few_pixels_or_none_is_refused() {
+        assert!(DisplayFrame::from_gray(3, 2, &[0; 5]).is_err());
+        assert!(DisplayFrame::from_rgb(0, 2, Vec::new()).is_err());
+        // Would overflow a 32-bit product.
+        assert!(DisplayFrame::from_gray(65_536, 65_536, &[]).is_err());
+    }
+}

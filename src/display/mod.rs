@@ -1,0 +1,41 @@
+//! The panel as a second screen: these levels, on that monitor, now.
+//!
+//! [`Display`] is the connection to the window system. [`Display::monitors`] lists what there is; [`MonitorChoice`]
+//! names one by connector, EDID, serial number or place. [`PanelWindow`] covers one monitor exactly and keeps it so;
+//! [`show`] does the whole for one frame, [`play`] for a sequence of them.
+//! [`examine`] looks at everything that is known to spoil levels, and [`test_card`] shows it to an eye.
+//!
+//! # What is promised
+//!
+//! A frame is shown as it is: 8 bits of red, green and blue, one frame pixel on each monitor pixel, without gamma,
+//! blending, dithering or scaling on the way to the frame buffer. Before it shows anything it is made sure, as far as
+//! the window system tells, that the monitor has exactly the frame's size, is neither scaled, rotated nor mirrored, and that
+//! the graphics card's gamma table is the identity; else it is refused in words that say what to change. What happens
+//! behind the frame buffer (limited-range RGB, dithering in the card's output stage, overscan in the monitor) cannot
+//! be seen from here.
+//!
+//! On X11 all of this is checked. On Wayland and other systems, what winit tells is.
+
+mod doctor;
+mod edid;
+mod frame;
+mod monitor;
+mod play;
+mod presenter;
+mod session;
+mod show;
+mod test_card;
+mod vblank;
+mod window;
+mod x11;
+
+pub use doctor::{Finding, Severity, examine};
+pub use edid::{Edid, NativeMode};
+pub use frame::DisplayFrame;
+pub use monitor::{Gamma, Monitor, MonitorChoice, ScanOut};
+pub use play::{FrameTime, PlayReport, PlaySettings, play};
+pub use presenter::Presenter;
+pub use session::Display;
+pub use show::{OnAbsence, ShowEnd, ShowReport, ShowSettings, show};
+pub use test_card::test_card;
+pub use window::{PanelWindow, Presented, Standing, WindowSettings};

@@ -1,0 +1,214 @@
+//! The connection to the window system, and the turning of its events.
+
+use super::monitor::Monitor;
+use super::x11::X11;
+use crate::error::{Error, Result};
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::{Rc, Weak};
+use std::time::Duration;
+use winit::application::ApplicationHandler;
+use winit::dpi::PhysicalSize;
+use winit::event::{ElementState, KeyEvent, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, EventLoop};
+use winit::keyboard::{Key, ModifiersState, NamedKey};
+use winit::monitor::MonitorHandle;
+use winit::platform::pump_events::{EventLoopExtPumpEvents, PumpStatus};
+use winit::raw_window_handle::{HasDisplayHandle, RawDisplayHandle};
+use winit::window::WindowId;
+
+/// Longest wait of a turn whose only purpose is to be inside the event loop.
+const TURN: Duration = Duration::from_millis(10);
+
+/// The window system: monitors, and windows on them.
+///
+/// There can be one in a process, made on the main thread (on Linux, on any one thread). Where the window system is an
+/// X server and that server ends, Xlib ends this process with exit code 1.
+pub struct Display {
+    event_loop: EventLoop<()>,
+    windows: HashMap<WindowId, Weak<RefCell<Inbox>>>,
+    x11: Option<Rc<X11>>,
+}
+
+/// What has happened to one window and was not yet dealt with.
+#[derive(Debug, Default)]
+pub(super) struct Inbox {
+    /// Esc, Q or Ctrl+C was pressed in it.
+    pub(super) end_key: bool,
+    /// It was asked to close.
+    pub(super) close: bool,
+    /// It has to be drawn again.
+    pub(super) redraw: bool,
+    /// Monitors may have changed since the window last made sure of its own.
+    pub(super) monitors_changed: bool,
+    /// Its place or size, or that of other windows, may have changed.
+    pub(super) windows_changed: bool,
+    /// The size that it must keep (columns, rows) [px].
+    pub(super) size: (u32, u32),
+    modifiers: ModifiersState,
+}
+
+impl Inbox {
+    /// An empty one, for a window of that size [px].
+    pub(super) fn of_size(width: u32, height: u32) -> Self {
+        Self { size: (width, height), ..Self::default() }
+    }
+}
+
+impl Display {
+    /// Connects to the window system: X11 or Wayland as the environment says, or that of the operating system.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Display`] when there is none, or when this process has had a connection already.
+    pub fn connect() -> Result<Self> {
+        let mut builder = EventLoop::builder();
+        #[cfg(all(unix, not(any(target_vendor = "apple", target_os = "android"))))]
+        {
+            // One setting for both window systems; from another thread than the main one it would panic without.
+            winit::platform::x11::EventLoopBuilderExtX11::with_any_thread(&mut builder, true);
+        }
+        let event_loop = builder.build().map_err(|error| Error::Display {
+            what: format!(
+                "no display server can be reached: {error}; run inside a desktop session, or set DISPLAY or WAYLAND_DISPLAY"
+            ),
+        })?;
+        let on_x11 = event_loop
+            .owned_display_handle()
+            .display_handle()
+            .is_ok_and(|handle| matches!(handle.as_raw(), RawDisplayHandle::Xlib(_)));
+        let x11 = if on_x11 { Some(Rc::new(X11::connect()?)) } else { None };
+        Ok(Self { event_loop, windows: HashMap::new(), x11 })
+    }
+
+    /// The monitors of the desktop, as they are now.
+    pub fn monitors(&mut self) -> Result<Vec<Monitor>> {
+        if let Some(x11) = &self.x11 {
+            return x11.monitors();
+        }
+        self.with_event_loop(|event_loop| {
+            let primary = event_loop.primary_monitor();
+            let handles = event_loop.available_monitors().enumerate();
+            handles.map(|(index, handle)| monitor_of(index, &handle, primary.as_ref() == Some(&handle))).collect()
+        })
+    }
+
+    /// Deals with what the window system has sent; waits up to `timeout` for something to come.
+    pub fn turn(&mut self, timeout: Duration) -> Result<()> {
+        self.pump(timeout, &mut Handler { windows: &self.windows.clone(), action: None::<fn(&ActiveEventLoop)> })?;
+        let Some(x11) = &self.x11 else { return Ok(()) };
+        let changes = x11.changes()?;
+        self.windows.retain(|_, window| window.strong_count() > 0);
+        for inbox in self.windows.values().filter_map(Weak::upgrade) {
+            let mut inbox = inbox.borrow_mut();
+            inbox.monitors_changed |= changes.monitors;
+            inbox.windows_changed |= changes.windows;
+        }
+        Ok(())
+    }
+
+    /// The own connection to the X server, where the window system is one.
+    pub(super) fn x11(&self) -> Option<Rc<X11>> {
+        self.x11.clone()
+    }
+
+    /// From now on, events of window `id` go into `inbox`.
+    pub(super) fn watch(&mut self, id: WindowId, inbox: &Rc<RefCell<Inbox>>) {
+        self.windows.insert(id, Rc::downgrade(inbox));
+    }
+
+    /// Does `action` where winit lets windows be made: inside its event loop.
+    pub(super) fn with_event_loop<T>(&mut self, action: impl FnOnce(&ActiveEventLoop) -> T) -> Result<T> {
+        let mut outcome = None;
+        let windows = self.windows.clone();
+        let mut handler = Handler {
+            windows: &windows,
+            action: Some(|event_loop: &ActiveEventLoop| outcome = Some(action(event_loop))),
+        };
+        // The loop calls `about_to_wait` once in each turn.
+        self.pump(Duration::ZERO, &mut handler)?;
+        if handler.action.is_some() {
+            self.pump(TURN, &mut handler)?;
+        }
+        drop(handler);
+        outcome.ok_or_else(|| Error::Display { what: "the window system's event loop does not turn".into() })
+    }
+
+    fn pump<F: FnOnce(&ActiveEventLoop)>(&mut self, timeout: Duration, handler: &mut Handler<'_, F>) -> Result<()> {
+        match self.event_loop.pump_app_events(Some(timeout), handler) {
+            PumpStatus::Continue => Ok(()),
+            PumpStatus::Exit(code) => {
+                Err(Error::Display { what: format!("the window system ended the connection (code {code})") })
+            }
+        }
+    }
+}
+
+/// A monitor as winit describes it; it knows neither EDID nor scan-out.
+fn monitor_of(index: usize, handle: &MonitorHandle, primary: bool) -> Monitor {
+    let (size, position) = (handle.size(), handle.position());
+    Monitor {
+        index,
+        name: handle.name().unwrap_or_else(|| format!("monitor-{index}")),
+        width: size.width,
+        height: size.height,
+        x: position.x,
+        y: position.y,
+        refresh: handle.refresh_rate_millihertz().map(|rate| f64::from(rate) / 1e3),
+        scale: handle.scale_factor(),
+        primary,
+        edid: None,
+        scan_out: None,
+    }
+}
+
+struct Handler<'a, F> {
+    windows: &'a HashMap<WindowId, Weak<RefCell<Inbox>>>,
+    action: Option<F>,
+}
+
+impl<F: FnOnce(&ActiveEventLoop)> ApplicationHandler for Handler<'_, F> {
+    fn resumed(&mut self, _: &ActiveEventLoop) {}
+
+    fn window_event(&mut self, _: &ActiveEventLoop, id: WindowId, event: WindowEvent) {
+        let Some(inbox) = self.windows.get(&id).and_then(Weak::upgrade) else { return };
+        let mut inbox = inbox.borrow_mut();
+        match event {
+            WindowEvent::CloseRequested | WindowEvent::Destroyed => inbox.close = true,
+            WindowEvent::RedrawRequested => inbox.redraw = true,
+            WindowEvent::ModifiersChanged(modifiers) => inbox.modifiers = modifiers.state(),
+            WindowEvent::KeyboardInput {
+                event: KeyEvent { logical_key, state: ElementState::Pressed, .. }, ..
+            } if ends(&logical_key, inbox.modifiers) => inbox.end_key = true,
+            WindowEvent::ScaleFactorChanged { mut inner_size_writer, .. } => {
+                // Unless told otherwise, winit resizes the window to keep its size in scaled pixels.
+                let (width, height) = inbox.size;
+                if inner_size_writer.request_inner_size(PhysicalSize::new(width, height)).is_err() {
+                    inbox.windows_changed = true;
+                }
+                inbox.monitors_changed = true;
+            }
+            WindowEvent::Occluded(_) | WindowEvent::Moved(_) | WindowEvent::Resized(_) => {
+                inbox.monitors_changed = true;
+                inbox.windows_changed = true;
+            }
+            _ => {}
+        }
+    }
+
+    fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        if let Some(action) = self.action.take() {
+            action(event_loop);
+        }
+    }
+}
+
+fn ends(key: &Key, modifiers: ModifiersState) -> bool {
+    match key {
+        Key::Named(NamedKey::Escape) => true,
+        Key::Character(text) => {
+            text.eq_ignore_ascii_case("q") || (modifiers.control_key() && text.eq_ignore_ascii_case("c"))
+        }
+        _ => false,
+    }
+}

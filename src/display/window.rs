@@ -1,0 +1,437 @@
+//! A window that covers one monitor exactly, one window pixel on each monitor pixel, and never any other.
+
+use super::frame::DisplayFrame;
+use super::monitor::{Monitor, MonitorChoice};
+use super::presenter::{Presenter, Surface};
+use super::session::{Display, Inbox};
+use super::vblank::VerticalBlank;
+use super::x11::{Rectangle, X11};
+use crate::error::{Error, Result};
+use serde::Serialize;
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use winit::dpi::{PhysicalPosition, PhysicalSize};
+use winit::event_loop::ActiveEventLoop;
+use winit::raw_window_handle::{HasWindowHandle, RawWindowHandle};
+use winit::window::{Fullscreen, Window, WindowAttributes, WindowLevel};
+
+/// How long the window system may take to put the window where it belongs.
+const SETTLE_LIMIT: Duration = Duration::from_secs(5);
+/// How long it must have stood there before it counts as settled: window managers move a window just after it appears.
+const SETTLED: Duration = Duration::from_millis(50);
+/// Wait between two looks while it settles.
+const LOOK: Duration = Duration::from_millis(5);
+
+/// How a panel's window is made and held.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WindowSettings {
+    /// Who puts frames into it.
+    pub presenter: Presenter,
+    /// Whether a monitor on which levels would be altered is refused. If not, [`PanelWindow::warnings`] tells.
+    pub exact: bool,
+    /// Whether the window takes the keyboard, so that Esc, Q or Ctrl+C in it ends the show.
+    pub take_keyboard: bool,
+}
+
+impl Default for WindowSettings {
+    fn default() -> Self {
+        Self { presenter: Presenter::Auto, exact: true, take_keyboard: true }
+    }
+}
+
+/// A frame that has been handed to the window system.
+#[derive(Clone, Copy, Debug)]
+pub struct Presented {
+    /// Running number of the frame in its window, from 0. A frame drawn again after it was uncovered keeps its own.
+    pub number: u64,
+    /// When the window system had taken it.
+    pub at: Instant,
+    /// False when the window system would not take it (window hidden or monitor off): it is not on the panel.
+    pub taken: bool,
+}
+
+/// How it stands with a window.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Standing {
+    /// The last frame is on its monitor.
+    Shown,
+    /// The monitor is gone or has changed; the window is closed until it is back as it was.
+    Absent {
+        /// What happened.
+        why: String,
+    },
+    /// A key pressed in the window, or its being closed, ends the show.
+    Ended,
+}
+
+/// A window on exactly one monitor.
+///
+/// On X11 it is kept out of the window manager's hands (override-redirect): nothing resizes it, moves it to another
+/// monitor when its own is unplugged, or hides it with a workspace; whatever is raised above it is covered again.
+/// Elsewhere it is a borderless fullscreen window.
+pub struct PanelWindow {
+    open: Option<Open>,
+    monitor: Monitor,
+    settings: WindowSettings,
+    last: Arc<DisplayFrame>,
+    frames: u64,
+    covered: u64,
+    absent: Option<String>,
+    warnings: Vec<String>,
+}
+
+/// The parts that exist only while the monitor is there. The surface goes before the window that it draws into.
+struct Open {
+    surface: Surface,
+    window: Arc<Window>,
+    inbox: Rc<RefCell<Inbox>>,
+    x11: Option<(Rc<X11>, u32)>,
+    background: bool,
+    blank: Option<VerticalBlank>,
+}
+
+impl PanelWindow {
+    /// Opens a window on the monitor that is meant, with `first` on it from the first instant where the window system
+    /// can do that (X11).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Display`] when there is no such monitor, `first` is not exactly of its size, levels would be altered
+    /// on the way (and [`WindowSettings::exact`] is set), the window does not come to stand where it belongs, or nothing can
+    /// draw into it.
+    pub fn open(
+        display: &mut Display,
+        choice: &MonitorChoice,
+        first: &Arc<DisplayFrame>,
+        settings: &WindowSettings,
+    ) -> Result<Self> {
+        let monitors = display.monitors()?;
+        let monitor = choice.find(&monitors)?.clone();
+        let (open, warnings) = Open::new(display, &monitor, first, settings)?;
+        Ok(Self {
+            open: Some(open),
+            monitor,
+            settings: settings.clone(),
+            last: Arc::clone(first),
+            frames: 1,
+            covered: 0,
+            absent: None,
+            warnings,
+        })
+    }
+
+    /// The monitor that it is on.
+    pub fn monitor(&self) -> &Monitor {
+        &self.monitor
+    }
+
+    /// Who puts frames into it: [`Presenter::Gpu`] or [`Presenter::Software`]; none while its monitor is absent.
+    pub fn presenter(&self) -> Option<Presenter> {
+        self.open.as_ref().map(|open| open.surface.presenter())
+    }
+
+    /// The graphics adapter at work, if one is.
+    pub fn adapter(&self) -> Option<String> {
+        self.open.as_ref().and_then(|open| open.surface.adapter()).map(str::to_owned)
+    }
+
+    /// Frames handed over so far.
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// How often another window had come above and was covered again.
+    pub fn covered(&self) -> u64 {
+        self.covered
+    }
+
+    /// What alters levels on this monitor, where that was allowed.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Shows `frame` from now on. While the monitor is absent the frame is kept and shown when it is back.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Display`] when the frame is not of the monitor's size, or the window system refuses it.
+    pub fn present(&mut self, frame: &Arc<DisplayFrame>) -> Result<Presented> {
+        let taken = match &mut self.open {
+            Some(open) => {
+                let taken = open.surface.present(frame)?;
+                open.forget_background()?;
+                taken
+            }
+            None => {
+                check_size(frame, &self.monitor)?;
+                false
+            }
+        };
+        self.last = Arc::clone(frame);
+        self.frames += 1;
+        Ok(Presented { number: self.frames - 1, at: Instant::now(), taken })
+    }
+
+    /// Waits for the monitor's next vertical blank, if frames are not made to wait for it by the graphics card and the
+    /// X server tells of it. Returns the server's count of them.
+    pub(super) fn wait_for_vertical_blank(&mut self, limit: Duration) -> Result<Option<u64>> {
+        match self.open.as_mut().and_then(|open| open.blank.as_mut()) {
+            Some(blank) => blank.next(limit),
+            None => Ok(None),
+        }
+    }
+
+    /// Deals with what has happened to the window since the last call; call it after each [`Display::turn`].
+    ///
+    /// Draws the last frame again where it was uncovered, covers what was raised above it, closes the window when its monitor
+    /// is gone or changed, and opens it again when it is back.
+    pub fn attend(&mut self, display: &mut Display) -> Result<Standing> {
+        let Some(open) = &mut self.open else { return self.come_back(display) };
+        let (end, redraw, monitors_changed, windows_changed) = {
+            let mut inbox = open.inbox.borrow_mut();
+            let seen = (inbox.end_key || inbox.close, inbox.redraw, inbox.monitors_changed, inbox.windows_changed);
+            (inbox.redraw, inbox.monitors_changed, inbox.windows_changed) = (false, false, false);
+            seen
+        };
+        if end {
+            return Ok(Standing::Ended);
+        }
+        if monitors_changed && let Some(why) = self.misplaced(display)? {
+            self.open = None;
+            // The window is gone from the screen only once the server has been told.
+            display.turn(Duration::ZERO)?;
+            self.absent = Some(why.clone());
+            return Ok(Standing::Absent { why });
+        }
+        let Some(open) = &mut self.open else { return Ok(Standing::Shown) };
+        if windows_changed
+            && let Some((x11, id)) = &open.x11
+            && x11.keep_above(*id)?
+        {
+            self.covered += 1;
+        }
+        if redraw {
+            open.surface.present(&self.last)?;
+        }
+        Ok(Standing::Shown)
+    }
+
+    /// Why the window does not stand on its monitor any more, if so.
+    fn misplaced(&self, display: &mut Display) -> Result<Option<String>> {
+        let name = &self.monitor.name;
+        let monitors = display.monitors()?;
+        let Some(now) = monitors.iter().find(|monitor| is_again(monitor, &self.monitor)) else {
+            return Ok(Some(format!("monitor {name} is gone")));
+        };
+        if !now.same_place(&self.monitor) {
+            return Ok(Some(format!("monitor {name} has changed: {now}")));
+        }
+        if self.settings.exact
+            && let Some(fault) = now.faults().into_iter().next()
+        {
+            return Ok(Some(fault));
+        }
+        let Some(open) = &self.open else { return Ok(None) };
+        open.deviation(&self.monitor)
+    }
+
+    fn come_back(&mut self, display: &mut Display) -> Result<Standing> {
+        let why = self.absent.clone().unwrap_or_default();
+        let monitors = display.monitors()?;
+        let size = (self.monitor.width, self.monitor.height);
+        let back = monitors.into_iter().find(|monitor| {
+            is_again(monitor, &self.monitor)
+                && (monitor.width, monitor.height) == size
+                && (!self.settings.exact || monitor.faults().is_empty())
+        });
+        let Some(monitor) = back else { return Ok(Standing::Absent { why }) };
+        match Open::new(display, &monitor, &self.last, &self.settings) {
+            Ok((open, warnings)) => {
+                (self.open, self.monitor, self.warnings, self.absent) = (Some(open), monitor, warnings, None);
+                Ok(Standing::Shown)
+            }
+            // Desktops set a returning monitor up in several steps; what does not fit yet may fit at the next look.
+            Err(Error::Display { what }) => {
+                self.absent = Some(what.clone());
+                Ok(Standing::Absent { why: what })
+            }
+            Err(other) => Err(other),
+        }
+    }
+}
+
+impl Open {
+    fn new(
+        display: &mut Display,
+        monitor: &Monitor,
+        first: &Arc<DisplayFrame>,
+        settings: &WindowSettings,
+    ) -> Result<(Self, Vec<String>)> {
+        check_size(first, monitor)?;
+        let faults = monitor.faults();
+        if settings.exact && !faults.is_empty() {
+            return Err(Error::Display { what: faults.join("; ") });
+        }
+        let on_x11 = display.x11().is_some();
+        let window = display.with_event_loop(|event_loop| create(event_loop, monitor, on_x11))??;
+        let inbox = Rc::new(RefCell::new(Inbox::of_size(monitor.width, monitor.height)));
+        display.watch(window.id(), &inbox);
+        window.set_cursor_visible(false);
+        let x11 = display.x11().zip(x11_id(&window));
+        if let Some((x11, id)) = &x11 {
+            x11.set_background(*id, first)?;
+        }
+        window.set_visible(true);
+        settle(display, monitor, &window, x11.as_ref())?;
+        let mut surface = Surface::new(settings.presenter, &window, monitor.width, monitor.height)?;
+        surface.present(first)?;
+        let background = x11.is_some();
+        // A server without the Present extension only leaves frames unsynchronised.
+        let blank = match &x11 {
+            Some((_, id)) if surface.presenter() == Presenter::Software => VerticalBlank::of_window(*id).ok(),
+            _ => None,
+        };
+        let open = Self { surface, window, inbox, x11, background, blank };
+        if let Some((x11, id)) = &open.x11 {
+            x11.keep_awake(true)?;
+            x11.keep_above(*id)?;
+            if settings.take_keyboard {
+                x11.focus(*id)?;
+            }
+        }
+        Ok((open, faults))
+    }
+
+    /// Where the window stands instead of on `monitor`, if so.
+    fn deviation(&self, monitor: &Monitor) -> Result<Option<String>> {
+        deviation(monitor, &self.window, self.x11.as_ref())
+    }
+
+    fn forget_background(&mut self) -> Result<()> {
+        if self.background
+            && let Some((x11, id)) = &self.x11
+        {
+            x11.clear_background(*id)?;
+            self.background = false;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Open {
+    fn drop(&mut self) {
+        if let Some((x11, _)) = &self.x11 {
+            // A connection that is lost has taken the request with it.
+            let _ = x11.keep_awake(false);
+        }
+    }
+}
+
+fn create(event_loop: &ActiveEventLoop, monitor: &Monitor, on_x11: bool) -> Result<Arc<Window>> {
+    let mut attributes = Window::default_attributes()
+        .with_title(format!("holodrive: {}", monitor.name))
+        .with_position(PhysicalPosition::new(monitor.x, monitor.y))
+        .with_inner_size(PhysicalSize::new(monitor.width, monitor.height))
+        .with_decorations(false)
+        .with_visible(false);
+    if on_x11 {
+        attributes = unmanaged(attributes);
+    } else {
+        let handle = event_loop.available_monitors().find(|handle| handle.name().as_ref() == Some(&monitor.name));
+        let Some(handle) = handle else {
+            return Err(Error::Display { what: format!("monitor {} is gone", monitor.name) });
+        };
+        attributes = attributes
+            .with_fullscreen(Some(Fullscreen::Borderless(Some(handle))))
+            .with_window_level(WindowLevel::AlwaysOnTop);
+    }
+    let window = event_loop.create_window(attributes);
+    window.map(Arc::new).map_err(|error| Error::Display { what: format!("no window can be made: {error}") })
+}
+
+#[cfg(all(unix, not(any(target_vendor = "apple", target_os = "android"))))]
+fn unmanaged(attributes: WindowAttributes) -> WindowAttributes {
+    winit::platform::x11::WindowAttributesExtX11::with_override_redirect(attributes, true)
+}
+
+#[cfg(not(all(unix, not(any(target_vendor = "apple", target_os = "android")))))]
+fn unmanaged(attributes: WindowAttributes) -> WindowAttributes {
+    attributes
+}
+
+fn x11_id(window: &Window) -> Option<u32> {
+    match window.window_handle().ok()?.as_raw() {
+        RawWindowHandle::Xlib(handle) => u32::try_from(handle.window).ok(),
+        RawWindowHandle::Xcb(handle) => Some(handle.window.get()),
+        _ => None,
+    }
+}
+
+/// Waits until the window stands on its monitor and stays there.
+fn settle(display: &mut Display, monitor: &Monitor, window: &Window, x11: Option<&(Rc<X11>, u32)>) -> Result<()> {
+    let start = Instant::now();
+    let mut right_since = None;
+    loop {
+        display.turn(LOOK)?;
+        let wrong = deviation(monitor, window, x11)?;
+        let now = Instant::now();
+        match wrong {
+            None => {
+                if now - *right_since.get_or_insert(now) >= SETTLED {
+                    return Ok(());
+                }
+            }
+            Some(wrong) if now - start > SETTLE_LIMIT => return Err(Error::Display { what: wrong }),
+            Some(_) => right_since = None,
+        }
+    }
+}
+
+/// Where the window stands instead of exactly on `monitor`, if so.
+fn deviation(monitor: &Monitor, window: &Window, x11: Option<&(Rc<X11>, u32)>) -> Result<Option<String>> {
+    let name = &monitor.name;
+    if let Some((x11, id)) = x11 {
+        let wanted = Rectangle::of(monitor);
+        return Ok(match x11.placement(*id)? {
+            Some(place) if place == wanted => None,
+            Some(place) => Some(format!("the window should cover {name} ({wanted}) but stands {place}")),
+            None => Some(format!("the window for {name} is not shown")),
+        });
+    }
+    let size = window.inner_size();
+    if (size.width, size.height) != (monitor.width, monitor.height) {
+        return Ok(Some(format!(
+            "the window should cover {name} with {}x{} px but the window system gave it {}x{}",
+            monitor.width, monitor.height, size.width, size.height
+        )));
+    }
+    if window.scale_factor() != 1.0 {
+        return Ok(Some(format!("the window system scales {name} by {}; set its scale to 1", window.scale_factor())));
+    }
+    // Wayland tells the monitor only once something has been drawn.
+    let elsewhere = window.current_monitor().and_then(|handle| handle.name()).filter(|on| on != name);
+    Ok(elsewhere.map(|on| format!("the window should be on {name} but the window system put it on {on}")))
+}
+
+fn check_size(frame: &DisplayFrame, monitor: &Monitor) -> Result<()> {
+    if (frame.width(), frame.height()) == (monitor.width, monitor.height) {
+        return Ok(());
+    }
+    let Monitor { name, width, height, .. } = monitor;
+    Err(Error::Display {
+        what: format!(
+            "the frame is {}x{} px but monitor {name} shows {width}x{height}: frames are not scaled; set the monitor to the \
+             panel's own mode, or choose the profile that fits",
+            frame.width(),
+            frame.height(),
+        ),
+    })
+}
+
+/// Whether `now` is the monitor that `before` was: same connector, same EDID.
+fn is_again(now: &Monitor, before: &Monitor) -> bool {
+    now.name == before.name && now.edid == before.edid
+}

@@ -1,0 +1,199 @@
+//! Lanes of the x86-64 vector units.
+
+use super::Lanes;
+use std::arch::x86_64::*;
+
+/// Sixteen f32 (AVX-512 F and DQ).
+#[derive(Clone, Copy)]
+pub(crate) struct Avx512(__m512);
+
+/// Eight f32 (AVX2 and FMA).
+#[derive(Clone, Copy)]
+pub(crate) struct Avx2(__m256);
+
+// SAFETY: each function needs the set named in the type; pointers are the caller's promise.
+unsafe impl Lanes for Avx512 {
+    const COUNT: usize = 16;
+    type Index = __m512i;
+    #[inline(always)]
+    unsafe fn splat(x: f32) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm512_set1_ps(x)) }
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        // SAFETY: readable as promised.
+        unsafe { Self(_mm512_loadu_ps(from)) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        // SAFETY: writable as promised.
+        unsafe { _mm512_storeu_ps(to, self.0) }
+    }
+    #[inline(always)]
+    unsafe fn add(self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm512_add_ps(self.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn sub(self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm512_sub_ps(self.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn mul(self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm512_mul_ps(self.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn div(self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm512_div_ps(self.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn min(self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm512_min_ps(self.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn max(self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm512_max_ps(self.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn sqrt(self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm512_sqrt_ps(self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn fma(self, b: Self, c: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm512_fmadd_ps(self.0, b.0, c.0)) }
+    }
+    #[inline(always)]
+    unsafe fn fnma(self, b: Self, c: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm512_fnmadd_ps(self.0, b.0, c.0)) }
+    }
+    #[inline(always)]
+    unsafe fn turn(self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm512_reduce_ps::<8>(self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn index(self) -> __m512i {
+        // SAFETY: the caller is where the set is present.
+        unsafe { _mm512_cvttps_epi32(self.0) }
+    }
+    #[inline(always)]
+    unsafe fn number(index: __m512i) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm512_cvtepi32_ps(index)) }
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const f32, index: __m512i) -> Self {
+        // SAFETY: sixteen readable values as promised.
+        unsafe { Self(_mm512_permutexvar_ps(index, _mm512_loadu_ps(table))) }
+    }
+    #[inline(always)]
+    unsafe fn where_le(self, a: Self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm512_maskz_mov_ps(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a.0, b.0), self.0)) }
+    }
+}
+
+// SAFETY: each function needs the set named in the type; pointers are the caller's promise.
+unsafe impl Lanes for Avx2 {
+    const COUNT: usize = 8;
+    type Index = __m256i;
+    #[inline(always)]
+    unsafe fn splat(x: f32) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm256_set1_ps(x)) }
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        // SAFETY: readable as promised.
+        unsafe { Self(_mm256_loadu_ps(from)) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        // SAFETY: writable as promised.
+        unsafe { _mm256_storeu_ps(to, self.0) }
+    }
+    #[inline(always)]
+    unsafe fn add(self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm256_add_ps(self.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn sub(self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm256_sub_ps(self.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn mul(self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm256_mul_ps(self.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn div(self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm256_div_ps(self.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn min(self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm256_min_ps(self.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn max(self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm256_max_ps(self.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn sqrt(self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm256_sqrt_ps(self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn fma(self, b: Self, c: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm256_fmadd_ps(self.0, b.0, c.0)) }
+    }
+    #[inline(always)]
+    unsafe fn fnma(self, b: Self, c: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm256_fnmadd_ps(self.0, b.0, c.0)) }
+    }
+    #[inline(always)]
+    unsafe fn turn(self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm256_sub_ps(self.0, _mm256_round_ps::<8>(self.0))) }
+    }
+    #[inline(always)]
+    unsafe fn index(self) -> __m256i {
+        // SAFETY: the caller is where the set is present.
+        unsafe { _mm256_cvttps_epi32(self.0) }
+    }
+    #[inline(always)]
+    unsafe fn number(index: __m256i) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm256_cvtepi32_ps(index)) }
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const f32, index: __m256i) -> Self {
+        // SAFETY: sixteen readable values as promised.
+        unsafe {
+            let low = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table), index);
+            let high = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table.add(8)), index);
+            // Bit 3 of the index, moved to the sign, chooses the upper half.
+            Self(_mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<28>(index))))
+        }
+    }
+    #[inline(always)]
+    unsafe fn where_le(self, a: Self, b: Self) -> Self {
+        // SAFETY: the caller is where the set is present.
+        unsafe { Self(_mm256_and_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a.0, b.0), self.0)) }
+    }
+}

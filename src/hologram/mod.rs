@@ -1,0 +1,210 @@
+//! Points → the field on the panel: one definition, engines with a stated error, and a planner that chooses.
+//!
+//! [`definition`] says what the field of a point is; [`oracle`] computes exactly that, slowly. The engines are a closed
+//! set ([`Method`]), each tested against the oracle as a complex field. [`plan`] chooses one for a wanted error and says
+//! why, in what time and memory; [`compute`] runs it.
+
+pub mod definition;
+mod exact;
+mod lanes;
+mod near;
+mod oracle;
+mod sources;
+mod tiles;
+
+pub use lanes::InstructionSet;
+pub use oracle::{oracle, oracle_at};
+pub use sources::Coverage;
+
+use crate::error::{Error, Result};
+use crate::field::{Field, Grid};
+use crate::points::PointSource;
+use crate::progress::Progress;
+use definition::Optics;
+use exact::{DIRECT_ERROR, Division};
+use sources::{Source, sources};
+use std::time::Instant;
+
+/// How a field is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Method {
+    /// Double precision, term by term: for tests and small jobs.
+    Oracle,
+    /// Vectorised sum to 1e-4 whatever the wanted error.
+    Direct,
+    /// Vectorised sum as matrix products over tiles as large as the wanted error allows.
+    Tiles,
+}
+
+impl Method {
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Oracle => "oracle",
+            Self::Direct => "direct",
+            Self::Tiles => "tiles",
+        }
+    }
+}
+
+/// How a point's wave is limited to what the panel can diffract.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Cull {
+    /// The definition's taper.
+    #[default]
+    Soft,
+    /// The bare sphere inside |Δx| ≤ |z|·tan(asin(λ/2·pitch_x)) and the same in y, as other programs do it; its edge
+    /// diffracts, 1–2 % of the field. `oracle`, `direct` and `tiles` only.
+    Hard,
+    /// The bare sphere everywhere, aliased where the panel cannot carry it. `oracle`, `direct` and `tiles` only.
+    None,
+}
+
+/// What is asked of [`plan`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HologramSettings {
+    /// Wanted relative L2 error of the field, above 1e-5.
+    pub error: f64,
+    /// The engine to take; the planner chooses where `None`.
+    pub method: Option<Method>,
+    /// How waves are limited.
+    pub cull: Cull,
+    /// Memory that the computation may take beside points and field [bytes].
+    pub memory: u64,
+    /// The instruction set to run on; the machine's widest where `None`.
+    pub instruction_set: Option<InstructionSet>,
+}
+
+impl Default for HologramSettings {
+    fn default() -> Self {
+        Self { error: 1e-3, method: None, cull: Cull::Soft, memory: 1 << 30, instruction_set: None }
+    }
+}
+
+/// What will be done, why, and at what cost.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// The engine.
+    pub method: Method,
+    /// Why this one.
+    pub reason: String,
+    /// Predicted wall time on this machine [s].
+    pub seconds: f64,
+    /// Predicted relative L2 error of the field.
+    pub error: f64,
+    /// Memory beside points and field [bytes].
+    pub memory: u64,
+    /// Instruction set of the kernels.
+    pub instruction_set: InstructionSet,
+    /// Settings that the plan answers.
+    pub settings: HologramSettings,
+}
+
+/// What was done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HologramReport {
+    /// The engine.
+    pub method: Method,
+    /// Why this one.
+    pub reason: String,
+    /// Instruction set of the kernels.
+    pub instruction_set: InstructionSet,
+    /// Wall time [s].
+    pub seconds: f64,
+    /// Time that the plan predicted [s].
+    pub predicted_seconds: f64,
+    /// Bound on the relative L2 error against the definition.
+    pub error_bound: f64,
+    /// Memory beside points and field [bytes].
+    pub memory: u64,
+    /// Points reached, left out and lost light; point–pixel pairs.
+    pub coverage: Coverage,
+}
+
+/// A field and how it came about.
+#[derive(Clone, Debug)]
+pub struct Computed {
+    /// The field on the panel.
+    pub field: Field,
+    /// How it came about.
+    pub report: HologramReport,
+}
+
+/// Chooses engine and parameters for these points on this grid.
+///
+/// Refused: points that are not finite, settings out of their domain, a job that does not fit its memory.
+pub fn plan(points: &[PointSource], grid: &Grid, wavelength: f64, settings: &HologramSettings) -> Result<Plan> {
+    let optics = Optics::new(grid, wavelength)?;
+    let error = settings.error;
+    if !(1e-5..1.0).contains(&error) {
+        return Err(Error::parameter("error", format!("{error:e} must lie between 1e-5 and 1")));
+    }
+    let set = settings.instruction_set.unwrap_or_else(InstructionSet::detect);
+    if !InstructionSet::available().contains(&set) {
+        return Err(Error::unsupported(format!("this machine has no {}", set.name())));
+    }
+    let sources = sources(points)?;
+    let coverage = Coverage::of(points.len(), &sources, grid, &optics, settings.cull);
+    let (method, reason) = match settings.method {
+        Some(method) => (method, "asked for".to_owned()),
+        None if error < DIRECT_ERROR => (Method::Direct, format!("an error of {error:.0e} was asked")),
+        None => (Method::Tiles, format!("tiles as large as an error of {error:.0e} allows")),
+    };
+    let division = |error| Division::new(&optics, grid, &sources, settings.cull, error);
+    let (memory, predicted, rate) = match method {
+        Method::Oracle => (24 * points.len() as u64 + 8 * grid.len() as u64, 1e-5, 2e7),
+        Method::Direct => {
+            let division = division(DIRECT_ERROR);
+            (division.bytes, division.error, 5e9)
+        }
+        Method::Tiles => {
+            let division = division(error);
+            (division.bytes, division.error, 1e10)
+        }
+    };
+    if memory > settings.memory {
+        let hint = "give more memory, or a smaller grid".to_owned();
+        return Err(Error::Memory { what: method.name(), needed: memory >> 20, budget: settings.memory >> 20, hint });
+    }
+    let seconds = coverage.pairs / (rate * rayon::current_num_threads() as f64);
+    Ok(Plan { method, reason, seconds, error: predicted, memory, instruction_set: set, settings: *settings })
+}
+
+/// Computes the field as planned; the plan may come from another cloud of the same kind (its choices are kept).
+pub fn compute(
+    points: &[PointSource],
+    grid: &Grid,
+    wavelength: f64,
+    plan: &Plan,
+    progress: &Progress,
+) -> Result<Computed> {
+    let start = Instant::now();
+    let optics = Optics::new(grid, wavelength)?;
+    let cull = plan.settings.cull;
+    let sources = sources(points)?;
+    let coverage = Coverage::of(points.len(), &sources, grid, &optics, cull);
+    let set = plan.instruction_set;
+    let sum = |error: f64| -> Result<(Field, f64)> {
+        let division = Division::new(&optics, grid, &sources, cull, error);
+        Ok((division.sum(grid, &optics, &sources, cull, set, progress)?, division.error))
+    };
+    let (field, error_bound) = match plan.method {
+        Method::Oracle => (oracle(points, grid, wavelength, cull)?.to_f32(), 1e-5),
+        Method::Direct => sum(DIRECT_ERROR)?,
+        Method::Tiles => sum(plan.settings.error)?,
+    };
+    let report = HologramReport {
+        method: plan.method,
+        reason: plan.reason.clone(),
+        instruction_set: set,
+        seconds: start.elapsed().as_secs_f64(),
+        predicted_seconds: plan.seconds,
+        error_bound,
+        memory: plan.memory,
+        coverage,
+    };
+    Ok(Computed { field, report })
+}
+
+#[cfg(test)]
+mod tests;

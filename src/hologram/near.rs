@@ -1,0 +1,225 @@
+//! Points near the panel: the definition's integral as a short sum of products of one-dimensional kernels.
+//!
+//! f_z is not a sum over axes, but near the panel it nearly is. With S(f) = √(1/λ² − f²),
+//!
+//! ```text
+//! e^{i2π d f_z}/f_z = e^{i2π d (S(f_x) + S(f_y) − 1/λ)} · G(f_x, f_y)
+//! ```
+//!
+//! where G is smooth: its phase is at most κ = 2πd/λ·sin²θ_x·sin²θ_y/4, even at the corner of the band. G is
+//! interpolated in f_y² at R Chebyshev nodes, error ≤ 2(κ/4)^R/R!, so the field is Σ_R X_r(x)·Y_r(y), each the
+//! transform of a tapered one-dimensional spectrum, exact at every sub-pixel position.
+
+use super::Source;
+use super::definition::Optics;
+use crate::error::Result;
+use crate::field::{Complex32, Complex64, Field};
+use crate::progress::Progress;
+use rayon::prelude::*;
+use rustfft::{Fft, FftPlanner};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+/// Highest number of products: beyond it the direct form is nearer.
+const HIGHEST_RANK: usize = 32;
+
+/// Error at which the expansion of G is cut.
+const ACCURACY: f64 = 2e-6;
+
+/// Pixels beyond the cone after which the taper's own tail, exp(−(0.0895·px)²)/(π·px), is dropped: 3e-6.
+const TAIL: f64 = 34.0;
+
+/// Pixels beyond the cone after which the kernel is zero to 1e-10: the distance to its alias.
+const SILENCE: f64 = 64.0;
+
+/// Points whose kernels are held together.
+const BATCH: usize = 256;
+
+/// Rows that one task adds to.
+const BAND: usize = 16;
+
+/// Number of products that a point at this distance takes, if this form serves it.
+pub(crate) fn rank(optics: &Optics, distance: f64) -> Option<usize> {
+    let sine = optics.taper.map(|taper| (optics.wavelength * taper.limit).powi(2));
+    // 1/f_z adds a factor (1 − ab/2) to G: of the size of a phase ab.
+    let kappa = TAU * distance / optics.wavelength * sine[0] * sine[1] / 4.0 + sine[0] * sine[1];
+    let mut error = 2.0;
+    for rank in 1..=HIGHEST_RANK {
+        error *= kappa / 4.0 / rank as f64;
+        if error <= ACCURACY {
+            return Some(rank);
+        }
+    }
+    None
+}
+
+/// Memory of a batch of kernels [bytes].
+pub(crate) fn bytes(optics: &Optics, sources: &[Source], indexes: &[usize]) -> u64 {
+    let largest = indexes.iter().map(|&i| {
+        let distance = sources[i].distance;
+        let span: f64 = (0..2).map(|axis| 2.0 * (optics.cone(axis, distance) / optics.pitch[axis] + TAIL) + 2.0).sum();
+        rank(optics, distance).unwrap_or(1) as u64 * span as u64 * 8
+    });
+    largest.max().unwrap_or(0) * BATCH.min(indexes.len()) as u64
+}
+
+/// Adds near sources to the field.
+pub(crate) fn add(
+    field: &mut Field,
+    optics: &Optics,
+    sources: &[Source],
+    indexes: &[usize],
+    progress: &Progress,
+) -> Result<()> {
+    let grid = field.grid;
+    for batch in indexes.chunks(BATCH) {
+        let kernels: Vec<Option<Kernel>> = batch
+            .par_iter()
+            .map_init(Plans::default, |plans, &i| {
+                if progress.stopped() {
+                    return None;
+                }
+                let s = &sources[i];
+                Kernel::new(optics, s, grid.column(s.x), grid.row(s.y), grid.width, grid.height, plans)
+            })
+            .collect();
+        progress.check()?;
+        field.samples.par_chunks_mut(grid.width * BAND).enumerate().for_each(|(band, samples)| {
+            for (i, row) in samples.chunks_exact_mut(grid.width).enumerate() {
+                kernels.iter().flatten().for_each(|kernel| kernel.add_row(band * BAND + i, row));
+            }
+        });
+        progress.advance(batch.len() as u64);
+    }
+    Ok(())
+}
+
+/// Transforms of the lengths in use, and their scratch.
+#[derive(Default)]
+struct Plans {
+    plans: Vec<Arc<dyn Fft<f64>>>,
+    scratch: Vec<Complex64>,
+}
+
+impl Plans {
+    /// Σ_k spectrum(k)·exp(+i2πkm/n), in place: the trapezoid rule of the integral over f, whose weight 1/(n·pitch) is
+    /// in the spectrum.
+    fn sum(&mut self, spectrum: &mut [Complex64]) {
+        let n = spectrum.len();
+        let plan = match self.plans.iter().find(|plan| plan.len() == n) {
+            Some(plan) => plan.clone(),
+            None => {
+                self.plans.push(FftPlanner::new().plan_fft_inverse(n));
+                self.plans[self.plans.len() - 1].clone()
+            }
+        };
+        self.scratch.resize(plan.get_inplace_scratch_len(), Complex64::default());
+        plan.process_with_scratch(spectrum, &mut self.scratch);
+    }
+}
+
+/// The field of one point: Σ_r x[r]·y[r] on a patch of pixels.
+struct Kernel {
+    first: [usize; 2],
+    x: Vec<Vec<Complex32>>,
+    y: Vec<Vec<Complex32>>,
+}
+
+impl Kernel {
+    /// The patch of a source at fractional column and row; `None` where it misses the panel.
+    fn new(
+        optics: &Optics,
+        source: &Source,
+        column: f64,
+        row: f64,
+        width: usize,
+        height: usize,
+        plans: &mut Plans,
+    ) -> Option<Self> {
+        let rank = rank(optics, source.distance).unwrap_or(HIGHEST_RANK);
+        let span = |axis: usize, position: f64, count: usize| {
+            let reach = optics.cone(axis, source.distance) / optics.pitch[axis] + TAIL;
+            let first = (position - reach).ceil().max(0.0);
+            let last = (position + reach).floor().min(count as f64 - 1.0);
+            (first <= last).then_some((first as usize, last as usize))
+        };
+        let (columns, rows) = (span(0, column, width)?, span(1, row, height)?);
+        let inverse = 1.0 / optics.wavelength;
+        let highest = optics.taper[1].reach(5.0).powi(2);
+        let nodes: Vec<f64> = (0..rank)
+            .map(|n| 0.5 * highest * (1.0 - (std::f64::consts::PI * (n as f64 + 0.5) / rank as f64).cos()))
+            .collect();
+        let fz = |square: f64| (inverse * inverse - square).max(0.0).sqrt();
+        let turns = |cycles: f64| Complex64::cis((cycles - cycles.floor()) * TAU);
+        let factor = Complex64::new(0.0, source.amplitude);
+        let (mut x, mut y) = (Vec::with_capacity(rank), Vec::with_capacity(rank));
+        for (n, &node) in nodes.iter().enumerate() {
+            // S(f_x) − 1/λ and the phase of G at the node: f_z(f_x, node) − S(node).
+            let spectrum = |f: f64| {
+                let z = fz(f * f + node);
+                factor * turns(source.distance * (z - fz(node))) / z
+            };
+            let mut line = kernel(optics, 0, source.distance, column, columns, plans, spectrum);
+            // A converging wave is the conjugate of a diverging one; the phase φ is not conjugated.
+            let phase = turns(source.turns);
+            for u in &mut line {
+                *u = if source.sign < 0.0 { u.conj() } else { *u } * phase;
+            }
+            x.push(line.iter().map(|u| Complex32::new(u.re as f32, u.im as f32)).collect());
+            let spectrum = |f: f64| {
+                let lagrange: f64 =
+                    (0..rank).filter(|&m| m != n).map(|m| (f * f - nodes[m]) / (node - nodes[m])).product();
+                turns(source.distance * fz(f * f)) * lagrange
+            };
+            let mut line = kernel(optics, 1, source.distance, row, rows, plans, spectrum);
+            if source.sign < 0.0 {
+                line.iter_mut().for_each(|u| *u = u.conj());
+            }
+            y.push(line.iter().map(|u| Complex32::new(u.re as f32, u.im as f32)).collect());
+        }
+        Some(Self { first: [columns.0, rows.0], x, y })
+    }
+
+    fn add_row(&self, row: usize, samples: &mut [Complex32]) {
+        let rows = self.y[0].len();
+        if row < self.first[1] || row >= self.first[1] + rows {
+            return;
+        }
+        let span = &mut samples[self.first[0]..self.first[0] + self.x[0].len()];
+        for (x, y) in self.x.iter().zip(&self.y) {
+            let y = y[row - self.first[1]];
+            for (u, x) in span.iter_mut().zip(x) {
+                *u += x * y;
+            }
+        }
+    }
+}
+
+/// ∫ W(f)·spectrum(f)·exp(i2πfΔ) df at the pixels first..=last, Δ from the fractional index `position`.
+fn kernel(
+    optics: &Optics,
+    axis: usize,
+    distance: f64,
+    position: f64,
+    (first, last): (usize, usize),
+    plans: &mut Plans,
+    spectrum: impl Fn(f64) -> Complex64,
+) -> Vec<Complex64> {
+    let (pitch, taper) = (optics.pitch[axis], optics.taper[axis]);
+    let period = 2.0 * (optics.cone(axis, distance) / pitch + SILENCE);
+    let n = (period as usize + 2).next_power_of_two();
+    let step = 1.0 / (n as f64 * pitch);
+    let nearest = position.floor();
+    let offset = position - nearest;
+    let mut values = vec![Complex64::default(); n];
+    // On pixels all frequencies that differ by 1/pitch are one: those beyond the Nyquist limit are added to their alias.
+    let top = (taper.reach(5.0) / step) as isize;
+    for k in -top..=top {
+        let f = k as f64 * step;
+        let turns = -f * pitch * offset;
+        let wave = Complex64::cis((turns - turns.floor()) * TAU);
+        values[k.rem_euclid(n as isize) as usize] += spectrum(f) * wave * (taper.at(f) * step);
+    }
+    plans.sum(&mut values);
+    (first..=last).map(|i| values[(i as isize - nearest as isize).rem_euclid(n as isize) as usize]).collect()
+}

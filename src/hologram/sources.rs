@@ -1,0 +1,147 @@
+//! Points as the engines take them: checked, without dark ones, with what the panel can and cannot show of them.
+
+use super::Cull;
+use super::definition::Optics;
+use crate::error::{Error, Result};
+use crate::field::Grid;
+use crate::points::PointSource;
+
+/// A point that shines.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Source {
+    /// Position along x [m].
+    pub(crate) x: f64,
+    /// Position along y [m].
+    pub(crate) y: f64,
+    /// Distance from the panel, |z| [m].
+    pub(crate) distance: f64,
+    /// +1 for a diverging wave (z ≤ 0), −1 for one that converges in front of the panel.
+    pub(crate) sign: f64,
+    /// Amplitude a.
+    pub(crate) amplitude: f64,
+    /// Initial phase [turns], reduced to [0, 1).
+    pub(crate) turns: f64,
+}
+
+impl Source {
+    /// Smallest and largest Δ from the source to a pixel, along x and y [m].
+    pub(crate) fn span(&self, grid: &Grid) -> [[f64; 2]; 2] {
+        [[grid.x(0) - self.x, grid.x(grid.width - 1) - self.x], [grid.y(grid.height - 1) - self.y, grid.y(0) - self.y]]
+    }
+}
+
+/// Checks points and leaves out those of amplitude zero; refuses what is not finite, naming the point.
+pub(crate) fn sources(points: &[PointSource]) -> Result<Vec<Source>> {
+    let mut sources = Vec::with_capacity(points.len());
+    for (i, p) in points.iter().enumerate() {
+        if !(p.position.is_finite() && p.amplitude.is_finite() && p.phase.is_finite()) {
+            let what = format!(
+                "point {i}: position {} m, amplitude {}, phase {} rad must be finite numbers",
+                p.position, p.amplitude, p.phase
+            );
+            return Err(Error::parameter("points", what));
+        }
+        if p.amplitude == 0.0 {
+            continue;
+        }
+        sources.push(Source {
+            x: p.position.x,
+            y: p.position.y,
+            distance: p.position.z.abs(),
+            sign: if p.position.z > 0.0 { -1.0 } else { 1.0 },
+            amplitude: f64::from(p.amplitude),
+            turns: (p.phase / std::f64::consts::TAU).rem_euclid(1.0),
+        });
+    }
+    Ok(sources)
+}
+
+/// What of the points' light the panel can send out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Coverage {
+    /// Points in all.
+    pub points: usize,
+    /// Points of amplitude zero, left out.
+    pub dark: usize,
+    /// Points whose cone meets no pixel: the panel cannot diffract their light to its place.
+    pub unreached: usize,
+    /// Part of the light in the points' cones that passes beside the panel, 0 to 1.
+    pub light_outside: f64,
+    /// Point–pixel pairs inside the cones (of all pixels without culling).
+    pub pairs: f64,
+}
+
+impl Coverage {
+    /// Counts; the light of a cone is taken as even over the frequencies |f| ≤ b, which is its power to (s/b)² ≈ 0.5 %.
+    pub(crate) fn of(points: usize, sources: &[Source], grid: &Grid, optics: &Optics, cull: Cull) -> Self {
+        let edges = [
+            [grid.x(0) - 0.5 * grid.pitch_x, grid.x(grid.width - 1) + 0.5 * grid.pitch_x],
+            [grid.y(grid.height - 1) - 0.5 * grid.pitch_y, grid.y(0) + 0.5 * grid.pitch_y],
+        ];
+        let mut coverage = Self { points, dark: points - sources.len(), ..Self::default() };
+        let (mut inside, mut all) = (0.0, 0.0);
+        for source in sources {
+            let power = source.amplitude * source.amplitude;
+            let (mut part, mut pixels) = (1.0, 1.0);
+            for (axis, position) in [source.x, source.y].into_iter().enumerate() {
+                let [low, high] = edges[axis].map(|edge| edge - position);
+                // Half a pixel more, so that a point on the panel reaches the pixel that it stands on.
+                let cone = optics.cone(axis, source.distance).max(0.5 * optics.pitch[axis]);
+                let span = (high.min(cone) - low.max(-cone)).max(0.0);
+                pixels *=
+                    if cull == Cull::None { (high - low) / optics.pitch[axis] } else { span / optics.pitch[axis] };
+                let middle = optics.taper[axis].middle;
+                let frequency = |d: f64| {
+                    let r = d.hypot(source.distance);
+                    if r > 0.0 { (d / (r * optics.wavelength)).clamp(-middle, middle) } else { 0.0 }
+                };
+                part *= (frequency(high) - frequency(low)) / (2.0 * middle);
+            }
+            all += power;
+            inside += power * part;
+            coverage.pairs += pixels;
+            coverage.unreached += usize::from(pixels == 0.0);
+        }
+        coverage.light_outside = if all > 0.0 { (1.0 - inside / all).clamp(0.0, 1.0) } else { 0.0 };
+        coverage
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    fn point(x: f64, z: f64, amplitude: f32) -> PointSource {
+        PointSource { position: DVec3::new(x, 0.0, z), amplitude, phase: 7.0 }
+    }
+
+    #[test]
+    fn bad_points_are_refused_by_number_and_dark_ones_left_out() {
+        let found = sources(&[point(0.0, 0.1, 0.0), point(0.0, -0.1, 2.0)]).expect("sources");
+        assert_eq!(found.len(), 1);
+        assert!((found[0].turns - (7.0 / std::f64::consts::TAU - 1.0)).abs() < 1e-15 && found[0].sign == 1.0);
+        for bad in [point(f64::NAN, 0.1, 1.0), point(0.0, f64::INFINITY, 1.0), point(0.0, 0.1, f32::NAN)] {
+            let message = sources(&[point(0.0, 0.1, 1.0), bad]).unwrap_err().to_string();
+            assert!(message.contains("point 1"), "{message}");
+        }
+    }
+
+    #[test]
+    fn light_that_misses_the_panel_is_counted() {
+        let grid = Grid::new(100, 100, 8e-6, 8e-6).expect("grid");
+        let optics = Optics::new(&grid, 633e-9).expect("optics");
+        let of = |points: &[PointSource]| {
+            Coverage::of(points.len(), &sources(points).expect("sources"), &grid, &optics, Cull::Soft)
+        };
+        // At 1 mm the cone (±40 µm) lies inside the panel (±400 µm); 2 mm aside it misses it; on the edge half is lost.
+        assert!(of(&[point(0.0, 1e-3, 1.0)]).light_outside < 1e-12);
+        let missed = of(&[point(2e-3, 1e-3, 1.0), point(0.0, 1e-3, 1.0), point(0.0, 1e-3, 0.0)]);
+        assert_eq!((missed.unreached, missed.dark, missed.points), (1, 1, 3));
+        assert!((missed.light_outside - 0.5).abs() < 1e-12);
+        assert!((of(&[point(4e-4, 1e-3, 1.0)]).light_outside - 0.5).abs() < 1e-9);
+        // On the panel itself: one pixel, all light inside.
+        let on = of(&[point(1e-5, 0.0, 1.0)]);
+        assert!(on.light_outside < 1e-12 && (on.pairs - 1.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,238 @@
+//! The exact sphere, separable over small tiles: sums of points as complex matrix products.
+//!
+//! About the centre of a tile the distance splits as r(u, v) = r(u, 0) + r(0, v) − r(0, 0) + ε with the phase error
+//! k|ε| ≤ k·|x₀y₀|·uv/r³ ([`Shape`] chooses the tile so that its mean stays below the wanted error). No small-angle
+//! assumption enters: each factor is the sphere's own expansion about the tile, with f64 set-up per point and tile.
+//! Where no tile is small enough (wide angles, near points) each pixel takes its own exact path.
+//!
+//! The engines `direct` and `tiles` are this one, with tiles small enough for 1e-4, or for the error that was asked.
+
+mod edge;
+mod kernel;
+mod shape;
+
+pub(crate) use shape::Shape;
+
+use super::definition::Optics;
+use super::lanes::{InstructionSet, dispatch};
+use super::{Cull, Source};
+use crate::error::Result;
+use crate::field::{Field, Grid};
+use crate::progress::Progress;
+use edge::EdgeTable;
+use kernel::{Axis, BATCH, Job, Limit, Panels, Relative, add_batch, add_exact};
+use rayon::prelude::*;
+
+/// Tiles whose results wait together to be added to the field.
+const WAVE: usize = 64;
+
+/// Where T has fallen to 1e-5 of the middle, in widths of the taper at q = 0.
+const EDGES: f64 = 3.02;
+
+/// Points of similar distance, summed with one tile shape.
+#[derive(Clone, Debug)]
+pub(crate) struct Class {
+    /// Indexes into the sources.
+    sources: Vec<usize>,
+    /// Tile of the class.
+    pub(crate) shape: Shape,
+    /// Smallest and largest distance [m].
+    distance: [f64; 2],
+}
+
+impl Class {
+    /// Number of points.
+    pub(crate) fn len(&self) -> usize {
+        self.sources.len()
+    }
+    /// Memory for this class's tables and one wave of tiles [bytes].
+    pub(crate) fn bytes(&self, optics: &Optics, cull: Cull) -> u64 {
+        let tile = 8 * (self.shape.width * self.shape.height) as u64;
+        let table = if cull == Cull::Soft {
+            let [lowest, highest] = self.q_range(optics);
+            EdgeTable::bytes(lowest, highest)
+        } else {
+            0
+        };
+        WAVE as u64 * tile + table + 48 * self.sources.len() as u64
+    }
+    fn q_range(&self, optics: &Optics) -> [f64; 2] {
+        let widths = optics.taper.map(|taper| taper.width);
+        let q = |width: f64, r: f64| 1.0 / (std::f64::consts::PI * optics.wavelength * r * width * width);
+        // At the cone's corner r is larger and 1 − sine² smaller than on the axis: at most a factor 4 at 0.6/λ.
+        let corner = optics.taper.map(|t| (optics.wavelength * t.reach(EDGES)).powi(2)).iter().sum::<f64>().min(0.9);
+        let low = q(widths[0].max(widths[1]), self.distance[1]) * (1.0 - corner).powf(1.5);
+        [low, q(widths[0].min(widths[1]), self.distance[0])]
+    }
+}
+
+/// Sorts sources into classes, a factor √2 of distance each, and chooses their tiles.
+pub(crate) fn classify(
+    optics: &Optics,
+    grid: &Grid,
+    sources: &[Source],
+    indexes: &[usize],
+    cull: Cull,
+    error: f64,
+) -> Vec<Class> {
+    let Some(nearest) = indexes.iter().map(|&i| sources[i].distance).min_by(f64::total_cmp) else {
+        return Vec::new();
+    };
+    let nearest = nearest.max(optics.wavelength);
+    let octave = |distance: f64| ((distance / nearest).max(1.0).log2() * 2.0) as usize;
+    let count = indexes.iter().map(|&i| octave(sources[i].distance)).max().unwrap_or(0) + 1;
+    let mut classes = vec![Vec::new(); count];
+    for &i in indexes {
+        classes[octave(sources[i].distance)].push(i);
+    }
+    classes
+        .into_iter()
+        .filter(|members| !members.is_empty())
+        .map(|mut members| {
+            // Neighbours in x are culled alike, so the branches of culling are predictable; ties keep their order.
+            members.sort_by(|&a, &b| sources[a].x.total_cmp(&sources[b].x).then(a.cmp(&b)));
+            let mut distance = [f64::INFINITY, 0.0f64];
+            let mut sine = [0.0f64; 2];
+            let mut tilt = 0.0;
+            for &i in &members {
+                let source = &sources[i];
+                distance = [distance[0].min(source.distance), distance[1].max(source.distance)];
+                let mut square = 1.0;
+                for (axis, [low, high]) in source.span(grid).into_iter().enumerate() {
+                    let limit = match cull {
+                        Cull::Soft => optics.wavelength * optics.taper[axis].reach(EDGES),
+                        Cull::Hard => optics.wavelength * optics.taper[axis].limit,
+                        Cull::None => 1.0,
+                    };
+                    let [low, high] = [low, high].map(|d| (d / d.hypot(source.distance)).clamp(-limit, limit));
+                    sine[axis] = sine[axis].max(low.abs().max(high.abs()));
+                    square *= (low * low + low * high + high * high) / 3.0;
+                }
+                tilt += square;
+            }
+            let tilt = (tilt / members.len() as f64).sqrt();
+            let shape = Shape::choose(optics, distance[0].max(1e-12), sine, tilt, error);
+            Class { sources: members, shape, distance }
+        })
+        .collect()
+}
+
+/// Adds the sources of a class to the field.
+pub(crate) fn add(
+    field: &mut Field,
+    optics: &Optics,
+    sources: &[Source],
+    class: &Class,
+    cull: Cull,
+    set: InstructionSet,
+    progress: &Progress,
+) -> Result<()> {
+    let table = match cull {
+        Cull::Soft => {
+            let [lowest, highest] = class.q_range(optics);
+            EdgeTable::new(lowest, highest)
+        }
+        Cull::Hard | Cull::None => EdgeTable::default(),
+    };
+    let limit = match cull {
+        Cull::Soft => Limit::Soft(&table),
+        Cull::Hard => Limit::Hard,
+        Cull::None => Limit::None,
+    };
+    let axes = [Axis::new(optics, 0, limit), Axis::new(optics, 1, limit)];
+    let Shape { width, height, exact, .. } = class.shape;
+    let job = Job { width, height, axes: &axes, wavenumber: 1.0 / optics.wavelength, limit };
+    let members: Vec<Source> = class.sources.iter().map(|&i| sources[i]).collect();
+    // Half width of the cone per metre of distance, out to where the taper is dark.
+    let tangent = [0, 1].map(|axis| match limit {
+        Limit::Soft(table) => {
+            let sine = (optics.wavelength * optics.taper[axis].reach(table.half)).min(0.9);
+            // The other axis tilts the cone: |Δx| = r·sine with r up to the corner's.
+            let other = (optics.wavelength * optics.taper[1 - axis].reach(table.half)).min(0.9);
+            sine / (1.0 - sine * sine - other * other).max(0.01).sqrt()
+        }
+        Limit::Hard => optics.cone(axis, 1.0),
+        Limit::None => f64::INFINITY,
+    });
+    let grid = field.grid;
+    let across = grid.width.div_ceil(width);
+    let tiles: Vec<usize> = (0..across * grid.height.div_ceil(height)).collect();
+    let work = (members.len() as u64).max(1);
+    for wave in tiles.chunks(WAVE) {
+        let results: Vec<Option<Panels>> = wave
+            .par_iter()
+            .map(|&tile| {
+                let at = [tile % across * width, tile / across * height];
+                let mut panels = Panels::default();
+                panels.clear(width, height);
+                let center = [
+                    grid.x(at[0]) + 0.5 * (width as f64 - 1.0) * grid.pitch_x,
+                    grid.y(at[1]) - 0.5 * (height as f64 - 1.0) * grid.pitch_y,
+                ];
+                let half = [0.5 * width as f64 * grid.pitch_x, 0.5 * height as f64 * grid.pitch_y];
+                let reach = half[0] + tangent[0] * class.distance[1];
+                let first = members.partition_point(|s| s.x < center[0] - reach);
+                let last = members.partition_point(|s| s.x <= center[0] + reach);
+                let mut batch = [Relative::default(); BATCH];
+                let mut count = 0;
+                for s in &members[first..last] {
+                    let (dx, dy) = (center[0] - s.x, center[1] - s.y);
+                    let dark =
+                        dx.abs() - half[0] > tangent[0] * s.distance || dy.abs() - half[1] > tangent[1] * s.distance;
+                    if dark {
+                        continue;
+                    }
+                    let (distance, amplitude) = (s.distance, s.amplitude);
+                    batch[count] = Relative { dx, dy, distance, amplitude, turns: s.turns, sign: s.sign };
+                    count += 1;
+                    if count == BATCH {
+                        if progress.stopped() {
+                            return None;
+                        }
+                        flush(set, &job, &batch, &mut panels, exact);
+                        count = 0;
+                    }
+                }
+                if count > 0 {
+                    flush(set, &job, &batch[..count], &mut panels, exact);
+                }
+                progress.advance(work);
+                Some(panels)
+            })
+            .collect();
+        progress.check()?;
+        for (&tile, panels) in wave.iter().zip(&results) {
+            let at = [tile % across * width, tile / across * height];
+            if let Some(panels) = panels {
+                scatter(field, at, [width, height], panels);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn flush(set: InstructionSet, job: &Job, points: &[Relative], panels: &mut Panels, exact: bool) {
+    // SAFETY: the set was detected on this machine; the panels were cleared for this job.
+    unsafe {
+        if exact {
+            dispatch!(set, add_exact(job: &Job, points: &[Relative], panels: &mut Panels));
+        } else {
+            dispatch!(set, add_batch(job: &Job, points: &[Relative], panels: &mut Panels));
+        }
+    }
+}
+
+/// Adds a tile at column and row `at` to the field, without what overhangs it.
+fn scatter(field: &mut Field, at: [usize; 2], size: [usize; 2], panels: &Panels) {
+    let grid = field.grid;
+    let width = size[0].min(grid.width - at[0]);
+    for row in 0..size[1].min(grid.height - at[1]) {
+        let to = (at[1] + row) * grid.width + at[0];
+        let from = row * size[0];
+        let parts = panels.re.values()[from..from + width].iter().zip(&panels.im.values()[from..from + width]);
+        for (u, (re, im)) in field.samples[to..to + width].iter_mut().zip(parts) {
+            u.re += re;
+            u.im += im;
+        }
+    }
+}

@@ -1,0 +1,444 @@
+//! Light that arrives straight from emitting surfaces and punctual lights.
+//!
+//! Area light is the exact polygonal form factor where the whole emitter is seen; where shadow rays disagree it is
+//! multiplied by the visible part, Σ w v / Σ w over stratified points of the emitter, w = cosθ cosθ′/r². So there is no
+//! noise outside of penumbrae, and none of a patch's shape inside.
+
+use super::form_factor::{FormFactor, point_to_element, point_to_polygon};
+use super::sampling::triangle_weights;
+use super::surface::Surface;
+use crate::random::Random;
+use crate::scene::bvh::{Hit, SceneBvh};
+use crate::scene::{LightKind, PunctualLight, Scene};
+use glam::{DVec3, Vec3};
+use std::collections::HashMap;
+use std::f64::consts::{FRAC_1_PI, PI};
+
+/// An emitter with more than this part of the surface of the scene's box is no lamp but a glowing wall: its shadows are
+/// as soft as those of other walls, and it lights through radiosity like them.
+const GLOWING_WALL: f64 = 0.1;
+/// So does one that does not emit this many times what it reflects of an even light in the room.
+const LEAST_CONTRAST: f64 = 3.0;
+/// More emitting polygons than this are not sampled one by one: the weakest ones then light through radiosity.
+const MOST_EMITTERS: usize = 128;
+
+/// Halvings of a near emitter's sides: pieces of 1/32 of its size.
+const MOST_CUTS: u32 = 5;
+/// Weights of corner 1 and the last one at the corners that span an emitter.
+const UNIT_TRIANGLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+
+/// Part of an emitter: a triangle or parallelogram in its weights, spanned by three corners.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    corners: [[f64; 2]; 3],
+    /// Form factor from the point that is lit.
+    factor: f64,
+}
+
+/// A convex emitting polygon: a triangle, or two that make a parallelogram.
+#[derive(Clone, Debug)]
+pub(crate) struct Emitter {
+    corners: Vec<DVec3>,
+    normal: DVec3,
+    area: f64,
+    radiance: Vec3,
+    two_sided: bool,
+    /// The triangle to look the emission up in, where it is not the same everywhere.
+    textured: Option<u32>,
+}
+
+impl Emitter {
+    /// Flux [W], all sides.
+    pub(crate) fn flux(&self) -> Vec3 {
+        let sides = if self.two_sided { 2.0 } else { 1.0 };
+        self.radiance * (self.area * PI * sides) as f32
+    }
+
+    /// A point of the polygon from the unit square, uniform in area, and the weights of corner 1 and the last one.
+    pub(crate) fn point(&self, u: f64, v: f64) -> (DVec3, [f64; 2]) {
+        self.within(&Piece { corners: UNIT_TRIANGLE, factor: 1.0 }, u, v)
+    }
+
+    fn is_parallelogram(&self) -> bool {
+        self.corners.len() == 4
+    }
+
+    /// The point with weights of corner 1 and the last one.
+    fn at(&self, [s, t]: [f64; 2]) -> DVec3 {
+        let (origin, last) = (self.corners[0], self.corners[self.corners.len() - 1]);
+        origin + (self.corners[1] - origin) * s + (last - origin) * t
+    }
+
+    /// A point of a piece from the unit square, uniform in area.
+    fn within(&self, piece: &Piece, u: f64, v: f64) -> (DVec3, [f64; 2]) {
+        let (s, t) = if self.is_parallelogram() { (u, v) } else { triangle_weights(u, v) };
+        let [o, a, b] = piece.corners;
+        let weights = std::array::from_fn(|k| o[k] + (a[k] - o[k]) * s + (b[k] - o[k]) * t);
+        (self.at(weights), weights)
+    }
+
+    /// Cuts the polygon until no piece is larger than it is far, so that all of a piece counts about equally.
+    fn pieces(&self, point: DVec3, normal: DVec3, factor: f64) -> Vec<Piece> {
+        let mut pieces = vec![Piece { corners: UNIT_TRIANGLE, factor }];
+        let reach = |piece: &Piece| {
+            let [o, a, b] = piece.corners.map(|w| self.at(w));
+            let middle = if self.is_parallelogram() { (a + b) * 0.5 } else { (o + a + b) / 3.0 };
+            ((a - o).length_squared().max((b - o).length_squared()), (middle - point).length_squared())
+        };
+        for _ in 0..MOST_CUTS {
+            if pieces.iter().all(|piece| reach(piece).0 <= reach(piece).1) {
+                break;
+            }
+            let mut finer = Vec::with_capacity(4 * pieces.len());
+            for piece in pieces {
+                let (size, distance) = reach(&piece);
+                if size <= distance {
+                    finer.push(piece);
+                    continue;
+                }
+                for corners in self.quarters(piece.corners) {
+                    let mut outline = corners.map(|w| self.at(w)).to_vec();
+                    if self.is_parallelogram() {
+                        outline.insert(2, outline[1] + outline[2] - outline[0]);
+                    }
+                    let factor = point_to_polygon(point, normal, &outline);
+                    if factor > 0.0 {
+                        finer.push(Piece { corners, factor });
+                    }
+                }
+            }
+            pieces = finer;
+        }
+        pieces
+    }
+
+    fn quarters(&self, [o, a, b]: [[f64; 2]; 3]) -> [[[f64; 2]; 3]; 4] {
+        let half = |p: [f64; 2], q: [f64; 2]| [(p[0] + q[0]) * 0.5, (p[1] + q[1]) * 0.5];
+        let (oa, ob, ab) = (half(o, a), half(o, b), half(a, b));
+        if self.is_parallelogram() {
+            let shift = |p: [f64; 2], by: [f64; 2]| [p[0] + by[0] - o[0], p[1] + by[1] - o[1]];
+            [[o, oa, ob], [oa, a, shift(oa, ob)], [ob, shift(oa, ob), b], [ab, shift(a, ob), shift(b, oa)]]
+        } else {
+            [[o, oa, ob], [oa, a, ab], [ob, ab, b], [ab, ob, oa]]
+        }
+    }
+
+    pub(crate) fn normal(&self) -> DVec3 {
+        self.normal
+    }
+
+    pub(crate) fn is_two_sided(&self) -> bool {
+        self.two_sided
+    }
+
+    /// Radiance at a point given by its weights.
+    pub(crate) fn radiance(&self, scene: &Scene, weights: [f64; 2], position: DVec3) -> Vec3 {
+        let Some(triangle) = self.textured else { return self.radiance };
+        let hit = Hit { triangle, distance: 0.0, position, barycentric: weights, front: true };
+        Surface::at(scene, &hit, 0.0).emission
+    }
+}
+
+/// All that shines by itself.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Emitters {
+    pub(crate) polygons: Vec<Emitter>,
+    /// Triangles whose emission is sampled through `polygons`; the emission of all others goes with radiosity.
+    pub(crate) sampled: Vec<bool>,
+    punctual: Vec<PunctualLight>,
+    form_factor: FormFactor,
+}
+
+/// How many shadow rays a point sends.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ShadowRays {
+    /// First set, shared among the emitters by their unobstructed light.
+    pub(crate) first: u32,
+    /// Second set for an emitter that the first one saw in part.
+    pub(crate) penumbra: u32,
+}
+
+impl Emitters {
+    pub(crate) fn new(scene: &Scene, form_factor: FormFactor) -> Self {
+        let mut found: Vec<(u32, Emitter)> = Vec::new();
+        for (index, triangle) in scene.triangles.iter().enumerate() {
+            let material = scene.material(index as u32);
+            if material.emissive.max_element() <= 0.0 || material.unlit || triangle.area() <= 0.0 {
+                continue;
+            }
+            let textured = material.emissive_texture.is_some();
+            let radiance = if textured { mean_emission(scene, index as u32) } else { material.emissive };
+            if radiance.max_element() > 0.0 {
+                let emitter = Emitter {
+                    corners: triangle.corners().to_vec(),
+                    normal: triangle.normal(),
+                    area: triangle.area(),
+                    radiance,
+                    two_sided: material.double_sided,
+                    textured: textured.then_some(index as u32),
+                };
+                found.push((index as u32, emitter));
+            }
+        }
+        let mut merged = parallelograms(scene, found);
+        let size = scene.bounds().map_or(DVec3::ZERO, |(low, high)| high - low);
+        let surface = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+        let level = mean_radiance(scene, &merged);
+        merged.retain(|(triangles, emitter)| {
+            let reflected = f64::from(scene.material(triangles[0]).base_color.element_sum() / 3.0) * level;
+            let bright = f64::from(emitter.radiance.element_sum()) >= LEAST_CONTRAST * reflected;
+            emitter.area <= GLOWING_WALL * surface && bright
+        });
+        // Strongest first; equal ones in the order of the file, so that the choice is always the same.
+        merged.sort_by(|a, b| b.1.flux().element_sum().total_cmp(&a.1.flux().element_sum()).then(a.0[0].cmp(&b.0[0])));
+        merged.truncate(MOST_EMITTERS);
+        let mut sampled = vec![false; scene.triangles.len()];
+        for &triangle in merged.iter().flat_map(|(triangles, _)| triangles) {
+            sampled[triangle as usize] = true;
+        }
+        let polygons = merged.into_iter().map(|(_, emitter)| emitter).collect();
+        Self { polygons, sampled, punctual: scene.lights.clone(), form_factor }
+    }
+
+    /// Irradiance over π [W/(m² sr)] at a point with unit shading `normal`; the point must be lifted off its surface.
+    pub(crate) fn light(
+        &self,
+        bvh: &SceneBvh,
+        point: DVec3,
+        normal: DVec3,
+        rays: ShadowRays,
+        random: &mut Random,
+    ) -> Vec3 {
+        let (lamps, points) = self.light_apart(bvh, point, normal, rays, random);
+        lamps + points
+    }
+
+    /// The same, apart: from emitting surfaces, and from punctual lights.
+    pub(crate) fn light_apart(
+        &self,
+        bvh: &SceneBvh,
+        point: DVec3,
+        normal: DVec3,
+        rays: ShadowRays,
+        random: &mut Random,
+    ) -> (Vec3, Vec3) {
+        let mut sum = Vec3::ZERO;
+        let mut total = 0.0;
+        let mut seen: [(usize, f64); MOST_EMITTERS] = [(0, 0.0); MOST_EMITTERS];
+        let mut count = 0;
+        for (index, emitter) in self.polygons.iter().enumerate() {
+            let height = (point - emitter.corners[0]).dot(emitter.normal);
+            if height > 0.0 || (emitter.two_sided && height < 0.0) {
+                let factor = point_to_polygon(point, normal, &emitter.corners);
+                if factor > 0.0 {
+                    seen[count] = (index, factor);
+                    count += 1;
+                    total += factor * f64::from(emitter.radiance.element_sum());
+                }
+            }
+        }
+        for &(index, factor) in &seen[..count] {
+            let emitter = &self.polygons[index];
+            let share = factor * f64::from(emitter.radiance.element_sum()) / total;
+            let side = (f64::from(rays.first) * share).sqrt().ceil().max(1.0) as u32;
+            let mut tally = Tally::default();
+            let pieces = emitter.pieces(point, normal, factor);
+            tally.cast(bvh, emitter, &pieces, point, normal, side, random);
+            if tally.is_mixed() && rays.penumbra > 0 {
+                let side = (f64::from(rays.penumbra) * share).sqrt().ceil() as u32;
+                tally.cast(bvh, emitter, &pieces, point, normal, side, random);
+            }
+            sum += tally.mean() * factor as f32;
+        }
+        let points = self.punctual.iter().map(|light| punctual(bvh, light, point, normal)).sum();
+        (sum * self.form_factor.scale() as f32, points)
+    }
+
+    /// Flux of the sampled polygons [W]; punctual lights are counted where they arrive.
+    pub(crate) fn flux(&self) -> Vec3 {
+        self.polygons.iter().map(Emitter::flux).sum()
+    }
+
+    pub(crate) fn is_dark(&self) -> bool {
+        self.polygons.is_empty() && self.punctual.iter().all(|light| light.intensity.max_element() <= 0.0)
+    }
+}
+
+/// What shadow rays to one emitter have found.
+#[derive(Default)]
+struct Tally {
+    weight: f64,
+    clear: f64,
+    light: Vec3,
+}
+
+impl Tally {
+    #[allow(clippy::too_many_arguments)]
+    fn cast(
+        &mut self,
+        bvh: &SceneBvh,
+        emitter: &Emitter,
+        pieces: &[Piece],
+        point: DVec3,
+        normal: DVec3,
+        side: u32,
+        random: &mut Random,
+    ) {
+        let count = side * side;
+        // Far emitters are one piece with a grid of strata; near ones are many, and take rays by what they contribute.
+        let total: f64 = pieces.iter().map(|piece| piece.factor).sum();
+        let shift = random.uniform();
+        let (mut piece, mut below) = (0, 0.0);
+        for cell in 0..count {
+            let (u, v);
+            if let [_] = pieces {
+                u = (f64::from(cell % side) + random.uniform()) / f64::from(side);
+                v = (f64::from(cell / side) + random.uniform()) / f64::from(side);
+            } else {
+                let target = total * (f64::from(cell) + shift) / f64::from(count);
+                while piece + 1 < pieces.len() && below + pieces[piece].factor < target {
+                    below += pieces[piece].factor;
+                    piece += 1;
+                }
+                (u, v) = (random.uniform(), random.uniform());
+            }
+            let (at, weights) = emitter.within(&pieces[piece], u, v);
+            if pieces.len() > 1 {
+                self.shoot(bvh, emitter, point, at, weights, 1.0);
+                continue;
+            }
+            let lit_side = if (point - at).dot(emitter.normal) >= 0.0 { emitter.normal } else { -emitter.normal };
+            let weight = point_to_element(point, normal, at, lit_side, 1.0);
+            if weight > 0.0 {
+                self.shoot(bvh, emitter, point, at, weights, weight);
+            }
+        }
+    }
+
+    fn shoot(&mut self, bvh: &SceneBvh, emitter: &Emitter, point: DVec3, at: DVec3, weights: [f64; 2], weight: f64) {
+        let lift = emitter.normal * bvh.offset().copysign((point - at).dot(emitter.normal));
+        self.weight += weight;
+        if !bvh.occluded(point, at + lift) {
+            self.clear += weight;
+            self.light += emitter.radiance(bvh.scene(), weights, at) * weight as f32;
+        }
+    }
+
+    fn is_mixed(&self) -> bool {
+        self.clear > 0.0 && self.clear < self.weight
+    }
+
+    /// Mean radiance towards the point, weighted by what each part of the emitter contributes, hidden parts dark.
+    fn mean(&self) -> Vec3 {
+        if self.weight <= 0.0 { Vec3::ZERO } else { self.light / self.weight as f32 }
+    }
+}
+
+fn punctual(bvh: &SceneBvh, light: &PunctualLight, point: DVec3, normal: DVec3) -> Vec3 {
+    let (towards, distance, strength) = match light.kind {
+        LightKind::Directional => (-light.direction.as_dvec3(), f64::INFINITY, 1.0),
+        LightKind::Point | LightKind::Spot { .. } => {
+            let span = light.position.as_dvec3() - point;
+            let distance = span.length();
+            let range = f64::from(light.range);
+            // KHR_lights_punctual's window, which ends the light at its range.
+            let window = if range.is_finite() { (1.0 - (distance / range).powi(4)).clamp(0.0, 1.0) } else { 1.0 };
+            (span / distance, distance, window / (distance * distance))
+        }
+    };
+    let strength = match light.kind {
+        LightKind::Spot { inner, outer } => {
+            let (inner, outer) = (f64::from(inner).cos(), f64::from(outer).cos());
+            let cosine = -towards.dot(light.direction.as_dvec3());
+            let edge = ((cosine - outer) / (inner - outer).max(1e-3)).clamp(0.0, 1.0);
+            strength * edge * edge
+        }
+        _ => strength,
+    };
+    let cosine = normal.dot(towards);
+    if !(cosine > 0.0 && strength > 0.0 && strength.is_finite()) {
+        return Vec3::ZERO;
+    }
+    let end = if distance.is_finite() {
+        light.position.as_dvec3()
+    } else {
+        let size = bvh.scene().bounds().map_or(0.0, |(low, high)| (high - low).length());
+        point + towards * (2.0 * size)
+    };
+    if bvh.occluded(point, end) { Vec3::ZERO } else { light.intensity * (strength * cosine * FRAC_1_PI) as f32 }
+}
+
+/// What all surfaces would show, in the sum of the colours, if the emitters' light were spread evenly over a closed room
+/// of their area and mean albedo: Φ/(πA(1 − ρ)).
+fn mean_radiance(scene: &Scene, emitters: &[(Vec<u32>, Emitter)]) -> f64 {
+    let (mut area, mut absorbing) = (0.0, 0.0);
+    for (index, triangle) in scene.triangles.iter().enumerate() {
+        let material = scene.material(index as u32);
+        let size = triangle.area() * if material.double_sided { 2.0 } else { 1.0 };
+        if size.is_finite() {
+            area += size;
+            absorbing += size * f64::from(1.0 - material.base_color.element_sum() / 3.0).clamp(0.0, 1.0);
+        }
+    }
+    let flux: f64 = emitters.iter().map(|(_, emitter)| f64::from(emitter.flux().element_sum())).sum();
+    if area > 0.0 { flux / (PI * absorbing.max(0.02 * area)) } else { 0.0 }
+}
+
+/// Mean emission of a textured triangle from a grid of points.
+fn mean_emission(scene: &Scene, triangle: u32) -> Vec3 {
+    let side = 8u32;
+    let sum: Vec3 = (0..side * side)
+        .map(|cell| {
+            let u = (f64::from(cell % side) + 0.5) / f64::from(side);
+            let v = (f64::from(cell / side) + 0.5) / f64::from(side);
+            let (s, t) = triangle_weights(u, v);
+            let hit = Hit { triangle, distance: 0.0, position: DVec3::ZERO, barycentric: [s, t], front: true };
+            Surface::at(scene, &hit, 0.0).emission
+        })
+        .sum();
+    sum / (side * side) as f32
+}
+
+/// Puts pairs of triangles that make a parallelogram of one colour together: half the form factors, better strata.
+fn parallelograms(scene: &Scene, found: Vec<(u32, Emitter)>) -> Vec<(Vec<u32>, Emitter)> {
+    let key = |p: DVec3| p.to_array().map(f64::to_bits);
+    let mut diagonals: HashMap<[[u64; 3]; 2], usize> = HashMap::new();
+    let mut out: Vec<Option<(Vec<u32>, Emitter)>> = Vec::new();
+    for (index, emitter) in found {
+        let mut partner = None;
+        for k in 0..3 {
+            let (p, q) = (emitter.corners[(k + 1) % 3], emitter.corners[(k + 2) % 3]);
+            // The neighbour runs through the shared edge the other way round.
+            if let Some(&other) = diagonals.get(&[key(q), key(p)]) {
+                let apex = emitter.corners[k];
+                if let Some((triangles, first)) = &out[other]
+                    && triangles.len() == 1
+                    && emitter.textured.is_none()
+                    && first.textured.is_none()
+                    && scene.triangles[triangles[0] as usize].material == scene.triangles[index as usize].material
+                {
+                    let opposite = first.corners.iter().find(|c| **c != p && **c != q).copied().unwrap_or(apex);
+                    let size = (p - q).length();
+                    if ((p + q) - (apex + opposite)).length() < 1e-5 * size && opposite != apex {
+                        partner = Some((other, vec![apex, p, opposite, q]));
+                    }
+                }
+            }
+        }
+        if let Some((other, corners)) = partner
+            && let Some((triangles, first)) = &mut out[other]
+        {
+            triangles.push(index);
+            first.corners = corners;
+            first.area += emitter.area;
+            continue;
+        }
+        if emitter.textured.is_none() {
+            for k in 0..3 {
+                diagonals.insert([key(emitter.corners[(k + 1) % 3]), key(emitter.corners[(k + 2) % 3])], out.len());
+            }
+        }
+        out.push(Some((vec![index], emitter)));
+    }
+    out.into_iter().flatten().collect()
+}

@@ -1,0 +1,422 @@
+//! Light on surfaces: what leaves each point of a scene towards an eye.
+//!
+//! Three parts, by the way that light came:
+//! - *straight from a lamp*: at each point that is asked for, by exact polygonal form factors and shadow rays
+//!   (the private module `emitters`): shadows have no patch edges;
+//! - *from other surfaces*: radiosity on an adaptive mesh (`elements`, `radiosity`), linear over each element; where
+//!   something cuts through an element the point gathers for itself, so that nothing leaks through a wall;
+//! - *by way of mirrors and glass*: rays that gather follow them (`paths`).
+//!
+//! Radiance of a Lambertian surface is ρE/π; "irradiance" in this module's tables is E/π, so that a white surface shows
+//! it unchanged.
+
+mod elements;
+mod emitters;
+pub mod form_factor;
+pub mod paths;
+mod radiosity;
+#[cfg(test)]
+pub(crate) mod rooms;
+mod sampling;
+pub mod surface;
+#[cfg(test)]
+mod tests;
+
+pub use form_factor::FormFactor;
+pub use radiosity::Convergence;
+pub use surface::Surface;
+
+use crate::error::{Error, Result};
+use crate::progress::Progress;
+use crate::random::Random;
+use crate::scene::bvh::{Hit, Ray, SceneBvh};
+use elements::{Elements, Fineness, Senders};
+use emitters::{Emitters, ShadowRays};
+use glam::{DVec3, Vec3};
+use paths::Mirrors;
+use radiosity::{End, Surroundings, Transport};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+use std::time::Instant;
+
+/// How light is computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IlluminationSettings {
+    /// How flux is divided; the seed paper's eq. (1) on request.
+    pub form_factor: FormFactor,
+    /// The solver stops when no colour's residual is larger than this part of the right-hand side.
+    pub residual: f64,
+    /// Rays per vertex that gather indirect light; fewer are cast when the scene has very many vertices.
+    pub indirect_rays: u32,
+    /// Shadow rays per point for all emitters together.
+    pub shadow_rays: u32,
+    /// Further shadow rays where an emitter is seen in part.
+    pub penumbra_rays: u32,
+    /// Longest edge of an element over the diagonal of the scene.
+    pub longest_element: f64,
+    /// Edges are not split below this part of the scene's diagonal.
+    pub shortest_element: f64,
+    /// An edge may be this many times as long as its surroundings are near.
+    pub nearness: f64,
+    /// Elements are not split beyond this many vertices.
+    pub most_vertices: usize,
+    /// Rays with which each point gathers indirect light for itself instead of reading the mesh.
+    pub final_gather: Option<u32>,
+    /// Most mirrors or glass surfaces that light follows one after another.
+    pub bounces: u32,
+    /// Seed of all sampling.
+    pub seed: u64,
+}
+
+impl Default for IlluminationSettings {
+    fn default() -> Self {
+        Self {
+            form_factor: FormFactor::Lambert,
+            residual: 1e-4,
+            indirect_rays: 1024,
+            shadow_rays: 16,
+            penumbra_rays: 64,
+            longest_element: 1.0 / 16.0,
+            shortest_element: 1.0 / 160.0,
+            nearness: 0.5,
+            most_vertices: 60_000,
+            final_gather: None,
+            bounces: 8,
+            seed: 1,
+        }
+    }
+}
+
+/// Where the light went [W], linear RGB.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// Emitted by surfaces, and what arrives from punctual lights.
+    pub emitted: Vec3,
+    /// Absorbed by surfaces.
+    pub absorbed: Vec3,
+    /// Left the scene.
+    pub escaped: Vec3,
+}
+
+impl Energy {
+    /// (absorbed + escaped)/emitted − 1 for the sum of the colours: zero but for the sampling of transport.
+    pub fn imbalance(&self) -> f64 {
+        let emitted = f64::from(self.emitted.element_sum());
+        let found = f64::from(self.absorbed.element_sum() + self.escaped.element_sum());
+        if emitted > 0.0 { found / emitted - 1.0 } else { 0.0 }
+    }
+}
+
+/// What computing the light took and gave.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct IlluminationReport {
+    /// Emitting polygons that are sampled directly.
+    pub emitters: usize,
+    /// Patches of the mesh.
+    pub patches: usize,
+    /// Vertices of the mesh.
+    pub vertices: usize,
+    /// Rays that gathered indirect light.
+    pub gathering_rays: u64,
+    /// How the solver ended.
+    pub convergence: Convergence,
+    /// Where the light went.
+    pub energy: Energy,
+    /// Time for it all [s].
+    pub seconds: f64,
+}
+
+/// Most gathering rays in all, so that their table stays below 100 MB.
+const MOST_GATHERING_RAYS: usize = 24_000_000;
+/// Rays with which a point gathers where its element is cut through.
+const DOUBT_SIDE: usize = 16;
+
+/// A lit scene.
+pub struct Illumination<'s> {
+    bvh: &'s SceneBvh<'s>,
+    settings: IlluminationSettings,
+    emitters: Emitters,
+    mesh: Elements<'s>,
+    mirrors: Mirrors,
+    senders: Senders,
+    /// Radiance that leaves each sender, without sampled emission.
+    leaving: Vec<Vec3>,
+    /// Indirect irradiance over π at the vertices.
+    irradiance: Vec<Vec3>,
+    report: IlluminationReport,
+}
+
+/// Per sender: what it does to light and what it gets.
+struct Patches {
+    area: Vec<f32>,
+    albedo: Vec<Vec3>,
+    emission: Vec<Vec3>,
+    direct: Vec<Vec3>,
+    punctual: Vec<Vec3>,
+}
+
+impl<'s> Illumination<'s> {
+    /// Lights a scene.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a setting outside its domain, [`Error::Interrupted`] when asked to stop.
+    pub fn new(bvh: &'s SceneBvh<'s>, settings: IlluminationSettings, progress: &Progress) -> Result<Self> {
+        settings.check()?;
+        let begin = Instant::now();
+        let scene = bvh.scene();
+        let emitters = Emitters::new(scene, settings.form_factor);
+        let mirrors = Mirrors::new(scene, settings.bounces);
+        let diagonal = scene.bounds().map_or(0.0, |(low, high)| (high - low).length());
+        let fineness = Fineness {
+            longest: settings.longest_element * diagonal,
+            shortest: settings.shortest_element * diagonal,
+            nearness: settings.nearness,
+            most_vertices: settings.most_vertices,
+        };
+        progress.start("meshing surfaces", 0);
+        let mesh = Elements::new(bvh, fineness, settings.seed ^ 0xe1e, |triangle, front| {
+            let material = scene.material(triangle);
+            let weak = material.emissive.max_element() > 0.0 && !emitters.sampled[triangle as usize];
+            (front || material.double_sided) && !material.unlit && (may_scatter(material) || weak)
+        });
+        let senders = mesh.senders();
+        progress.check()?;
+        let patches = Patches::new(bvh, &mesh, &senders, &emitters, &settings, progress)?;
+        let most = (MOST_GATHERING_RAYS / mesh.vertices.len().max(1)) as f64;
+        let side = f64::from(settings.indirect_rays).min(most).sqrt().floor().max(4.0) as usize;
+        let around = Surroundings { bvh, mesh: &mesh, senders: &senders, mirrors: &mirrors };
+        let transport = Transport::cast(&around, side, settings.seed ^ 0x6a7, progress)?;
+        let scale = settings.form_factor.scale() as f32;
+        let source: Vec<Vec3> =
+            (0..senders.all.len()).map(|s| patches.albedo[s] * patches.direct[s] + patches.emission[s]).collect();
+        let bounce = |x: &[Vec3]| -> Vec<Vec3> {
+            let each = senders.all.par_iter().zip(&patches.albedo);
+            each.map(|(&sender, &albedo)| albedo * mesh.mean_over(sender, x)).collect()
+        };
+        let (irradiance, convergence) =
+            radiosity::solve(&source, bounce, |b| transport.gather(b, scale), settings.residual, 200, progress)?;
+        let reflected = bounce(&irradiance);
+        let leaving: Vec<Vec3> = source.iter().zip(&reflected).map(|(s, r)| *s + *r).collect();
+        let mut light = Self {
+            bvh,
+            settings,
+            emitters,
+            mesh,
+            mirrors,
+            senders,
+            leaving,
+            irradiance,
+            report: IlluminationReport::default(),
+        };
+        light.report = IlluminationReport {
+            emitters: light.emitters.polygons.len(),
+            patches: light.mesh.leaves().count(),
+            vertices: light.mesh.vertices.len(),
+            gathering_rays: (light.mesh.vertices.len() * side * side) as u64,
+            convergence,
+            energy: light.energy(&patches, &transport),
+            seconds: begin.elapsed().as_secs_f64(),
+        };
+        Ok(light)
+    }
+
+    /// What it took.
+    pub fn report(&self) -> &IlluminationReport {
+        &self.report
+    }
+
+    /// The ray caster that the light was computed with.
+    pub fn bvh(&self) -> &'s SceneBvh<'s> {
+        self.bvh
+    }
+
+    /// Whether nothing shines at all: neither a sampled emitter, nor a weak one, nor a punctual light.
+    pub fn is_dark(&self) -> bool {
+        self.emitters.is_dark() && self.leaving.iter().all(|b| b.max_element() <= 0.0)
+    }
+
+    /// Radiance that a surface's diffuse part and its emission send out at a hit [W/(m² sr)].
+    pub fn radiance(&self, hit: &Hit, surface: &Surface, random: &mut Random) -> Vec3 {
+        if !surface.is_diffuse() {
+            return surface.emission;
+        }
+        surface.emission + surface.albedo * (self.direct(surface, random) + self.indirect(hit, surface, random))
+    }
+
+    /// Irradiance over π that comes straight from lamps.
+    pub fn direct(&self, surface: &Surface, random: &mut Random) -> Vec3 {
+        let point = surface.position + surface.facing * self.bvh.offset();
+        let rays = ShadowRays { first: self.settings.shadow_rays, penumbra: self.settings.penumbra_rays };
+        self.emitters.light(self.bvh, point, surface.normal, rays, random)
+    }
+
+    /// Irradiance over π that comes by way of other surfaces.
+    pub fn indirect(&self, hit: &Hit, surface: &Surface, random: &mut Random) -> Vec3 {
+        if let Some(rays) = self.settings.final_gather {
+            return self.gather(surface, f64::from(rays).sqrt().ceil() as usize, random);
+        }
+        let barycentric = hit.barycentric.map(|b| b as f32);
+        let Some((element, weights)) = self.mesh.locate(hit.triangle, hit.front, barycentric) else {
+            return Vec3::ZERO;
+        };
+        let element = &self.mesh.elements[element as usize];
+        if element.doubtful {
+            return self.gather(surface, DOUBT_SIDE, random);
+        }
+        element.corners.iter().zip(weights).map(|(&v, w)| self.irradiance[v as usize] * w).sum()
+    }
+
+    /// Indirect irradiance over π, gathered with `side`² rays from the mesh's radiosity.
+    fn gather(&self, surface: &Surface, side: usize, random: &mut Random) -> Vec3 {
+        let origin = surface.position + surface.facing * self.bvh.offset();
+        let directions: Vec<DVec3> = sampling::hemisphere(surface.normal, side, random).collect();
+        // `hemisphere` works on a copy of the stream; step past what it has used.
+        *random = Random::new(random.bits(), 1);
+        let around = self.surroundings();
+        let (mut sum, mut rays) = (Vec3::ZERO, 0.0f32);
+        for direction in directions {
+            if direction.dot(surface.facing) > 0.0 {
+                rays += 1.0;
+                if let End::Sender(sender, weight) = around.follow(Ray { origin, direction }, random) {
+                    sum += self.leaving[sender as usize] * weight;
+                }
+            }
+        }
+        sum * (self.settings.form_factor.scale() as f32 / rays.max(1.0))
+    }
+
+    fn surroundings(&self) -> Surroundings<'_> {
+        Surroundings { bvh: self.bvh, mesh: &self.mesh, senders: &self.senders, mirrors: &self.mirrors }
+    }
+
+    fn energy(&self, patches: &Patches, transport: &Transport) -> Energy {
+        let mut sums = [[0.0f64; 3]; 3];
+        let mut add = |which: usize, flux: Vec3| {
+            for (sum, part) in sums[which].iter_mut().zip(flux.to_array()) {
+                *sum += f64::from(part);
+            }
+        };
+        add(0, self.emitters.flux());
+        for (s, &sender) in self.senders.all.iter().enumerate() {
+            let flux = (f64::from(patches.area[s]) * PI) as f32;
+            let arriving = patches.direct[s] + self.mesh.mean_over(sender, &self.irradiance);
+            add(0, (patches.emission[s] + patches.punctual[s]) * flux);
+            add(1, (Vec3::ONE - patches.albedo[s]) * arriving * flux);
+            let corners = self.mesh.elements[sender.element as usize].corners;
+            let chosen = sender.corner.map_or(&corners[..], |k| &corners[k as usize..=k as usize]);
+            let n = chosen.len() as f32;
+            let losses = chosen.iter().map(|&v| transport.losses(v as usize));
+            let (escaped, black) = losses.fold((0.0, 0.0), |sum, l| (sum.0 + l.0 / n, sum.1 + l.1 / n));
+            add(2, self.leaving[s] * flux * escaped);
+            add(1, self.leaving[s] * flux * black);
+        }
+        for (index, emitter) in self.emitters.polygons.iter().enumerate() {
+            let side = 64u32;
+            let mut random = Random::new(self.settings.seed ^ 0xe4e, index as u64);
+            let (mut escaped, mut black) = (0.0f32, 0.0f32);
+            for cell in 0..side * side {
+                let (point, _) = emitter.point(random.uniform(), random.uniform());
+                let up = !emitter.is_two_sided() || cell % 2 == 0;
+                let normal = if up { emitter.normal() } else { -emitter.normal() };
+                let direction = sampling::hemisphere(normal, 1, &mut random).next().unwrap_or(normal);
+                random = Random::new(random.bits(), u64::from(cell));
+                let ray = Ray { origin: point + normal * self.bvh.offset(), direction };
+                match self.surroundings().follow(ray, &mut random) {
+                    End::Escaped => escaped += 1.0,
+                    End::Black => black += 1.0,
+                    End::Sender(..) => {}
+                }
+            }
+            let flux = emitter.flux() / (side * side) as f32;
+            add(2, flux * escaped);
+            add(1, flux * black);
+        }
+        let colour = |s: [f64; 3]| Vec3::new(s[0] as f32, s[1] as f32, s[2] as f32);
+        Energy { emitted: colour(sums[0]), absorbed: colour(sums[1]), escaped: colour(sums[2]) }
+    }
+}
+
+fn may_scatter(material: &crate::scene::Material) -> bool {
+    let metal = material.metallic >= 1.0
+        && material.roughness < surface::WIDE_LOBE
+        && material.metallic_roughness_texture.is_none();
+    material.base_color.max_element() > 0.0 && !metal && material.transmission < 1.0
+}
+
+impl Patches {
+    fn new(
+        bvh: &SceneBvh,
+        mesh: &Elements,
+        senders: &Senders,
+        emitters: &Emitters,
+        settings: &IlluminationSettings,
+        progress: &Progress,
+    ) -> Result<Self> {
+        progress.start("direct light on patches", senders.all.len() as u64);
+        let found: Vec<[Vec3; 5]> = senders
+            .all
+            .par_iter()
+            .enumerate()
+            .map(|(number, &sender)| {
+                progress.advance(1);
+                let element = &mesh.elements[sender.element as usize];
+                let buried = sender.corner.is_some_and(|k| mesh.vertices[element.corners[k as usize] as usize].buried);
+                let mut sums = [Vec3::ZERO; 5];
+                if buried || progress.stopped() {
+                    return sums;
+                }
+                // A share of the rays of a picture's point at each place: the mean over the patch is what counts.
+                let places = mesh.places(sender);
+                let share = places.len() as u32;
+                let rays = ShadowRays { first: settings.shadow_rays.div_ceil(share), penumbra: 0 };
+                let area = mesh.area(sender.element) / if sender.corner.is_some() { 3.0 } else { 1.0 };
+                let mut random = Random::new(settings.seed ^ 0x1ea, number as u64);
+                for &barycentric in &places {
+                    let position = bvh.scene().triangles[element.triangle as usize].at(barycentric);
+                    let hit =
+                        Hit { triangle: element.triangle, distance: 0.0, position, barycentric, front: element.front };
+                    let surface = Surface::at(bvh.scene(), &hit, (area / places.len() as f64).sqrt());
+                    let point = position + surface.facing * bvh.offset();
+                    let (lamps, points) = emitters.light_apart(bvh, point, surface.normal, rays, &mut random);
+                    sums[0] += surface.albedo;
+                    sums[1] += lamps + points;
+                    sums[2] += points;
+                    if !emitters.sampled[element.triangle as usize] {
+                        sums[3] += surface.emission;
+                    }
+                }
+                sums = sums.map(|sum| sum / share as f32);
+                sums[4] = Vec3::splat(area as f32);
+                sums
+            })
+            .collect();
+        progress.check()?;
+        let column = |k: usize| found.iter().map(|f| f[k]).collect();
+        let area = found.iter().map(|f| f[4].x).collect();
+        Ok(Self { albedo: column(0), direct: column(1), punctual: column(2), emission: column(3), area })
+    }
+}
+
+impl IlluminationSettings {
+    fn check(&self) -> Result<()> {
+        let within = |name: &'static str, value: f64, low: f64, high: f64| {
+            if value >= low && value <= high {
+                Ok(())
+            } else {
+                Err(Error::parameter(name, format!("{value} is outside [{low}, {high}]")))
+            }
+        };
+        within("residual", self.residual, 1e-7, 1.0)?;
+        within("longest-element", self.longest_element, 1e-4, 1.0)?;
+        within("shortest-element", self.shortest_element, 1e-5, self.longest_element)?;
+        within("nearness", self.nearness, 0.01, 100.0)?;
+        within("shadow-rays", f64::from(self.shadow_rays), 1.0, 1e6)?;
+        within("penumbra-rays", f64::from(self.penumbra_rays), 0.0, 1e6)?;
+        within("indirect-rays", f64::from(self.indirect_rays), 16.0, 1e6)?;
+        within("bounces", f64::from(self.bounces), 0.0, 1000.0)?;
+        if let Some(rays) = self.final_gather {
+            within("final-gather", f64::from(rays), 1.0, 1e6)?;
+        }
+        Ok(())
+    }
+}

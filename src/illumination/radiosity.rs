@@ -1,0 +1,225 @@
+//! Light that arrives by way of other surfaces.
+//!
+//! Unknown is the irradiance x at the vertices of [`Elements`]; a leaf sends out B = ρ(E + x̄)/π + its own weak
+//! emission. The transport from leaf to vertex is sampled once: each vertex casts cosine-distributed rays, and the part
+//! of them that ends on a leaf is the (1/π)∫cosθ dω form factor to its visible part. Rows sum to one or less by
+//! construction, so a closed furnace comes out exactly, and the work is rays × log n, not patches². Rays that meet a
+//! mirror or glass go on, so these take part in interreflection.
+//!
+//! The linear system x = Kρ(E + x)/π is solved to a stated residual by minimal residuals over conjugate directions
+//! (GCR, Eisenstat, Elman & Schultz 1983), each colour for itself.
+
+use super::elements::{Elements, NONE, Senders};
+use super::paths::{Continuation, Mirrors};
+use super::sampling::hemisphere;
+use crate::error::Result;
+use crate::progress::Progress;
+use crate::random::Random;
+use crate::scene::bvh::{Ray, SceneBvh, Sides};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Where a gathering ray has ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum End {
+    /// On a sender of the mesh, its light weighted by a colour.
+    Sender(u32, Vec3),
+    /// On something that reflects nothing diffusely.
+    Black,
+    /// Nowhere.
+    Escaped,
+}
+
+const ESCAPED: u32 = NONE;
+const BLACK: u32 = NONE - 1;
+/// The ray came by way of a mirror; its leaf and weight stand in the vertex' list.
+const TINTED: u32 = NONE - 2;
+
+/// The surfaces that gathering rays meet.
+#[derive(Clone, Copy)]
+pub(crate) struct Surroundings<'a> {
+    pub(crate) bvh: &'a SceneBvh<'a>,
+    pub(crate) mesh: &'a Elements<'a>,
+    pub(crate) senders: &'a Senders,
+    pub(crate) mirrors: &'a Mirrors,
+}
+
+impl Surroundings<'_> {
+    /// Follows a ray to what sends the light that it brings; emission of sampled emitters is not part of that.
+    pub(crate) fn follow(&self, ray: Ray, random: &mut Random) -> End {
+        let mut ray = ray;
+        let mut weight = Vec3::ONE;
+        for _ in 0..self.mirrors.bounces {
+            let Some(meeting) = self.bvh.meet(&ray, 0.0, f64::INFINITY, Sides::Both) else { return End::Escaped };
+            let mut factor = 1.0;
+            if self.mirrors.optical[meeting.triangle as usize] {
+                match self.mirrors.next(self.bvh, &ray, &meeting, random) {
+                    Continuation::Onward(next, tint) => {
+                        ray = next;
+                        weight *= tint;
+                        continue;
+                    }
+                    Continuation::Absorbed => return End::Black,
+                    Continuation::Diffuse(share) => factor = share,
+                }
+            }
+            let sender = self
+                .mesh
+                .locate(meeting.triangle, meeting.front, meeting.barycentric)
+                .and_then(|(element, weights)| self.mesh.sender(self.bvh, self.senders, element, weights));
+            return sender.map_or(End::Black, |sender| End::Sender(sender, weight * factor));
+        }
+        End::Black
+    }
+}
+
+/// The sampled transport from senders to vertices.
+pub(crate) struct Transport {
+    /// Rays per vertex.
+    rays: usize,
+    /// For each vertex and ray the number of the sender.
+    ends: Vec<u32>,
+    tinted: Vec<Vec<(u32, Vec3)>>,
+    /// Rays of each vertex that count (those above its horizon).
+    counted: Vec<f32>,
+}
+
+impl Transport {
+    /// Casts `side`² rays from each vertex.
+    pub(crate) fn cast(around: &Surroundings, side: usize, seed: u64, progress: &Progress) -> Result<Self> {
+        let (bvh, mesh) = (around.bvh, around.mesh);
+        let rays = side * side;
+        let mut ends = vec![BLACK; mesh.vertices.len() * rays];
+        progress.start("gathering indirect light", mesh.vertices.len() as u64);
+        let rest: Vec<(Vec<(u32, Vec3)>, f32)> = ends
+            .par_chunks_mut(rays.max(1))
+            .zip(&mesh.vertices)
+            .enumerate()
+            .map(|(index, (ends, vertex))| {
+                progress.advance(1);
+                if vertex.buried || progress.stopped() {
+                    return (Vec::new(), rays as f32);
+                }
+                let mut random = Random::new(seed, index as u64);
+                let (facing, origin) = (vertex.facing(), vertex.origin(bvh.offset()));
+                let (mut tinted, mut counted) = (Vec::new(), 0.0);
+                let directions: Vec<DVec3> = hemisphere(vertex.normal, side, &mut random).collect();
+                let mut random = Random::new(seed ^ 0x5bd1, index as u64);
+                for (end, direction) in ends.iter_mut().zip(directions) {
+                    if direction.dot(facing) <= 0.0 {
+                        continue;
+                    }
+                    counted += 1.0;
+                    *end = match around.follow(Ray { origin, direction }, &mut random) {
+                        End::Escaped => ESCAPED,
+                        End::Black => BLACK,
+                        End::Sender(sender, Vec3::ONE) => sender,
+                        End::Sender(sender, weight) => {
+                            tinted.push((sender, weight));
+                            TINTED
+                        }
+                    };
+                }
+                (tinted, counted)
+            })
+            .collect();
+        progress.check()?;
+        let (tinted, counted) = rest.into_iter().unzip();
+        Ok(Self { rays, ends, tinted, counted })
+    }
+
+    /// Mean of the senders' radiance over each vertex' rays: its irradiance over π.
+    pub(crate) fn gather(&self, radiance: &[Vec3], scale: f32) -> Vec<Vec3> {
+        self.ends
+            .par_chunks(self.rays.max(1))
+            .zip(&self.tinted)
+            .zip(&self.counted)
+            .map(|((ends, tinted), &counted)| {
+                let plain: Vec3 = ends.iter().filter(|&&e| e < TINTED).map(|&e| radiance[e as usize]).sum();
+                let tinted: Vec3 = tinted.iter().map(|&(e, weight)| radiance[e as usize] * weight).sum();
+                (plain + tinted) * (scale / counted.max(1.0))
+            })
+            .collect()
+    }
+
+    /// Parts of a vertex' rays that escape and that end on black.
+    pub(crate) fn losses(&self, vertex: usize) -> (f32, f32) {
+        let ends = &self.ends[vertex * self.rays..][..self.rays];
+        let counted = self.counted[vertex].max(1.0);
+        let escaped = ends.iter().filter(|&&e| e == ESCAPED).count() as f32;
+        let below = self.rays as f32 - self.counted[vertex];
+        let black = ends.iter().filter(|&&e| e == BLACK).count() as f32 - below;
+        (escaped / counted, black.max(0.0) / counted)
+    }
+}
+
+/// What the solver did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Convergence {
+    /// Applications of the transport.
+    pub iterations: usize,
+    /// Largest remaining ‖b − Ax‖ / ‖b‖ of the three colours.
+    pub residual: f64,
+}
+
+/// Solves x = T(s + R x) for the irradiance at vertices: `source` is what leaves send without interreflection, `bounce`
+/// makes what they send of the irradiance at vertices, `transport` gathers.
+pub(crate) fn solve(
+    source: &[Vec3],
+    bounce: impl Fn(&[Vec3]) -> Vec<Vec3>,
+    transport: impl Fn(&[Vec3]) -> Vec<Vec3>,
+    tolerance: f64,
+    most_iterations: usize,
+    progress: &Progress,
+) -> Result<(Vec<Vec3>, Convergence)> {
+    progress.start("solving interreflection", most_iterations as u64);
+    let right = transport(source);
+    let norm = squares(&right, &right);
+    let mut residual = right.clone();
+    let mut x = vec![Vec3::ZERO; right.len()];
+    let mut directions: Vec<(Vec<Vec3>, Vec<Vec3>, [f64; 3])> = Vec::new();
+    let mut convergence = Convergence { iterations: 1, residual: 0.0 };
+    loop {
+        let rest = squares(&residual, &residual);
+        convergence.residual =
+            (0..3).map(|c| if norm[c] > 0.0 { (rest[c] / norm[c]).sqrt() } else { 0.0 }).fold(0.0, f64::max);
+        if convergence.residual <= tolerance || convergence.iterations >= most_iterations {
+            return Ok((x, convergence));
+        }
+        progress.check()?;
+        progress.advance(1);
+        let mut p = residual.clone();
+        let scattered = transport(&bounce(&p));
+        let mut ap: Vec<Vec3> = p.iter().zip(&scattered).map(|(&p, &s)| p - s).collect();
+        convergence.iterations += 1;
+        for (q, aq, aq_squared) in &directions {
+            let along = ratio(squares(&ap, aq), *aq_squared);
+            for i in 0..p.len() {
+                p[i] -= q[i] * along;
+                ap[i] -= aq[i] * along;
+            }
+        }
+        let ap_squared = squares(&ap, &ap);
+        let step = ratio(squares(&residual, &ap), ap_squared);
+        for i in 0..p.len() {
+            x[i] += p[i] * step;
+            residual[i] -= ap[i] * step;
+        }
+        // Eight directions are enough to catch the few slow modes of a room; older ones go.
+        if directions.len() == 8 {
+            directions.remove(0);
+        }
+        directions.push((p, ap, ap_squared));
+    }
+}
+
+fn squares(a: &[Vec3], b: &[Vec3]) -> [f64; 3] {
+    a.iter().zip(b).fold([0.0; 3], |sum, (a, b)| {
+        let product = *a * *b;
+        [sum[0] + f64::from(product.x), sum[1] + f64::from(product.y), sum[2] + f64::from(product.z)]
+    })
+}
+
+fn ratio(a: [f64; 3], b: [f64; 3]) -> Vec3 {
+    Vec3::from_array(std::array::from_fn(|c| if b[c] > 0.0 { (a[c] / b[c]) as f32 } else { 0.0 }))
+}

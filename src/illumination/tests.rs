@@ -1,0 +1,277 @@
+//! Light against closed forms.
+
+use super::rooms::Room;
+use super::*;
+use crate::scene::{LightKind, Material, PunctualLight, Scene, Sides};
+
+fn lit<'s>(bvh: &'s SceneBvh<'s>, settings: IlluminationSettings) -> Illumination<'s> {
+    Illumination::new(bvh, settings, &Progress::new()).unwrap()
+}
+
+/// Radiance seen from a point along a direction.
+fn seen(light: &Illumination, origin: DVec3, direction: DVec3) -> Vec3 {
+    let hit = light.bvh().nearest(&Ray { origin, direction: direction.normalize() }, 0.0, Sides::Front).unwrap();
+    let surface = Surface::at(light.bvh().scene(), &hit, 0.0);
+    light.radiance(&hit, &surface, &mut Random::new(9, hit.distance.to_bits()))
+}
+
+fn close(value: Vec3, expected: [f64; 3], tolerance: f64) {
+    for (v, e) in value.to_array().into_iter().zip(expected) {
+        assert!((f64::from(v) / e - 1.0).abs() < tolerance, "{value} is not {expected:?} within {tolerance}");
+    }
+}
+
+fn glowing(albedo: [f32; 3], emission: [f32; 3]) -> Material {
+    Material { emissive: emission.into(), ..Material::diffuse(albedo.into()) }
+}
+
+/// Radiance along many directions from a point.
+fn panorama(light: &Illumination, origin: DVec3) -> Vec<Vec3> {
+    let mut random = Random::new(4, 4);
+    (0..60)
+        .map(|_| {
+            let d = DVec3::from_array(std::array::from_fn(|_| random.uniform() - 0.5));
+            seen(light, origin, d)
+        })
+        .collect()
+}
+
+#[test]
+fn furnaces_reach_their_radiance() {
+    // Closed, all faces alike: radiance E/(1 − ρ) everywhere. Emission of one and the same strength all round is
+    // the hardest case for sampled emitters, since each point sees them all; a body inside hides some of them.
+    for rho in [0.0f32, 0.5, 0.8, 0.95] {
+        let mut room = Room::default();
+        let m = room.material(glowing([rho, 0.5 * rho, 0.9], [1.0, 0.5, 0.1]));
+        room.cuboid(DVec3::ZERO, DVec3::new(2.0, 1.0, 1.5), true, [m; 6]);
+        room.cuboid(DVec3::new(0.9, 0.2, 0.5), DVec3::new(1.2, 0.6, 0.8), false, [m; 6]);
+        let bvh = SceneBvh::new(&room.scene);
+        let light = lit(&bvh, IlluminationSettings { shadow_rays: 256, ..IlluminationSettings::default() });
+        let rho = f64::from(rho);
+        let expected = [1.0 / (1.0 - rho), 0.5 / (1.0 - 0.5 * rho), 1.0];
+        let all = panorama(&light, DVec3::new(0.3, 0.4, 0.4));
+        let mean = all.iter().sum::<Vec3>() / all.len() as f32;
+        close(mean, expected, 5e-3);
+        // A single point's shadow rays leave a noise of their own; three per cent is some five sigma of it.
+        all.iter().for_each(|&l| close(l, expected, 3e-2));
+        assert!(light.report().energy.imbalance().abs() < 5e-3, "{:?}", light.report());
+        assert!(light.report().convergence.residual <= 1e-4);
+    }
+}
+
+#[test]
+fn a_cube_with_one_glowing_wall() {
+    // Energy is exact: Σ(1−ρ)B = ΣE for faces of one size, so the mean radiance over the walls is E/6 / (1 − ρ).
+    // (The zonal solution of analytic.json, with one value per face, need not and does not agree face by face.)
+    let mut room = Room::default();
+    let (dark, bright) = (room.material(glowing([0.5; 3], [0.0; 3])), room.material(glowing([0.5; 3], [1.0; 3])));
+    room.cuboid(DVec3::ZERO, DVec3::ONE, true, [dark, dark, dark, bright, dark, dark]);
+    let bvh = SceneBvh::new(&room.scene);
+    let light = lit(&bvh, IlluminationSettings::default());
+    let n = 12;
+    let mut faces = [Vec3::ZERO; 6];
+    for (axis, face) in (0..3).flat_map(|a| [(a, 0usize), (a, 1)]) {
+        for cell in 0..n * n {
+            let (s, t) = ((f64::from(cell % n) + 0.5) / f64::from(n), (f64::from(cell / n) + 0.5) / f64::from(n));
+            let mut p = DVec3::ZERO;
+            p[axis] = 0.5;
+            p[(axis + 1) % 3] = s;
+            p[(axis + 2) % 3] = t;
+            let d = DVec3::AXES[axis] * if face == 0 { -1.0 } else { 1.0 };
+            faces[2 * axis + face] += seen(&light, p, d) / (n * n) as f32;
+        }
+    }
+    let mean = faces.iter().sum::<Vec3>() / 6.0;
+    close(mean, [1.0 / 3.0; 3], 3e-3);
+    // The four side walls are alike, and the glowing one shows its emission above what it gets.
+    let sides = (faces[0] + faces[1] + faces[4] + faces[5]) / 4.0;
+    [0, 1, 4, 5].into_iter().for_each(|side: usize| close(faces[side], sides.as_dvec3().to_array(), 5e-3));
+    assert!(faces[3].x > 1.05 && faces[2].x < sides.x, "{faces:?}");
+    assert!(light.report().energy.imbalance().abs() < 3e-3, "{:?}", light.report().energy);
+}
+
+#[test]
+fn a_sphere_mixes_light_evenly() {
+    // Inside a sphere every form factor is dA/4πR²: a cap with 10 % of the area that emits 1, ρ = 0.6, gives 1.15 on
+    // the cap and 0.15 elsewhere (analytic.json). The mesh is a polyhedron: its cap is measured, not assumed.
+    let mut room = Room::default();
+    let (dark, bright) = (room.material(glowing([0.6; 3], [0.0; 3])), room.material(glowing([0.6; 3], [1.0; 3])));
+    room.sphere(DVec3::ZERO, 1.0, true, 24, dark);
+    let scene = &mut room.scene;
+    let total: f64 = scene.triangles.iter().map(crate::scene::Triangle::area).sum();
+    let mut cap = 0.0;
+    for t in &mut scene.triangles {
+        if t.corners().iter().all(|p| p.y > 0.79) {
+            t.material = bright;
+            cap += t.area();
+        }
+    }
+    let bvh = SceneBvh::new(scene);
+    let light = lit(&bvh, IlluminationSettings::default());
+    let around = cap / total / (1.0 - 0.6) * 0.6;
+    for d in [DVec3::X, DVec3::NEG_Y, DVec3::new(-0.3, -0.4, 0.9), DVec3::new(0.1, 0.3, -1.0)] {
+        close(seen(&light, DVec3::ZERO, d), [around; 3], 1.5e-2);
+    }
+    close(seen(&light, DVec3::ZERO, DVec3::new(0.1, 1.0, 0.05)), [1.0 + around; 3], 5e-3);
+}
+
+#[test]
+fn light_under_a_lamp_and_behind_a_blocker() {
+    // Howell's point-to-disk numbers with a square lamp are in `form_factor`; here shadows. A disk lamp of radius 1 at
+    // height 1 and a coaxial blocker of radius 0.2 at height 0.4 leave a form factor of 0.3 (analytic.json).
+    let mut room = Room::default();
+    let floor = room.material(Material::diffuse(Vec3::ONE));
+    let lamp = room.material(Material::emitter(Vec3::ONE));
+    let black = room.material(Material::diffuse(Vec3::ZERO));
+    room.quad(DVec3::new(-0.1, 0.0, -0.1), DVec3::Z * 0.2, DVec3::X * 0.2, floor);
+    let fan = |room: &mut Room, radius: f64, height: f64, material: u32| {
+        // 48 triangles that look down, of the disk's area.
+        let n = 48;
+        let step = std::f64::consts::TAU / f64::from(n);
+        let radius = radius * (step / step.sin()).sqrt();
+        for i in 0..n {
+            let at =
+                |k: i32| DVec3::new(radius * (step * f64::from(k)).cos(), height, radius * (step * f64::from(k)).sin());
+            room.face([DVec3::Y * height, at(i), at(i + 1)], material);
+        }
+    };
+    fan(&mut room, 1.0, 1.0, lamp);
+    fan(&mut room, 0.2, 0.4, black);
+    let bvh = SceneBvh::new(&room.scene);
+    let light = lit(&bvh, IlluminationSettings { shadow_rays: 4096, ..IlluminationSettings::default() });
+    let down = |x: f64| seen(&light, DVec3::new(x, 0.3, 1e-3), DVec3::NEG_Y);
+    close(down(1e-3), [0.3; 3], 1e-2);
+}
+
+#[test]
+fn an_empty_cornell_room_is_lit_directly_as_the_closed_form_says() {
+    // analytic.json, "cornell_empty_direct": lamp 0.130 × 0.105 m in a ceiling at 0.5488 m, floor of albedo 0.725….
+    let mut room = Room::default();
+    let white = room.material(Material::diffuse(Vec3::new(0.725, 0.71, 0.68)));
+    let lamp = room.material(Material::emitter(Vec3::new(17.0, 12.0, 4.0)));
+    room.quad(DVec3::ZERO, DVec3::Z * 0.5592, DVec3::X * 0.5528, white);
+    room.quad(DVec3::new(0.213, 0.5488, 0.227), DVec3::X * 0.13, DVec3::Z * 0.105, lamp);
+    let bvh = SceneBvh::new(&room.scene);
+    let light = lit(&bvh, IlluminationSettings::default());
+    assert_eq!(light.report().emitters, 1, "two triangles of a rectangle are one emitter");
+    for (x, z, expected) in [
+        (0.278, 0.2795, [0.175_100_756_508_359, 0.121_043_281_578_192_16, 0.038_642_925_574_258_54]),
+        (0.1, 0.1, [0.120_271_306_983_801_51, 0.083_140_895_375_414_91, 0.026_542_633_265_390_678]),
+        (0.278, 0.05, [0.127_720_696_469_444_6, 0.088_290_493_624_313_83, 0.028_186_636_462_222_258]),
+        (0.5, 0.5, [0.100_951_626_807_291_87, 0.069_785_627_618_509_27, 0.022_278_979_709_195_453]),
+    ] {
+        close(seen(&light, DVec3::new(x, 0.2, z), DVec3::NEG_Y), expected, 1e-4);
+    }
+}
+
+#[test]
+fn the_papers_form_factor_halves_each_transfer() {
+    let mut room = Room::default();
+    let m = room.material(glowing([0.5; 3], [1.0; 3]));
+    room.cuboid(DVec3::ZERO, DVec3::ONE, true, [m; 6]);
+    let bvh = SceneBvh::new(&room.scene);
+    let settings = IlluminationSettings { form_factor: FormFactor::Paper, ..IlluminationSettings::default() };
+    let light = lit(&bvh, settings);
+    // Half of the flux is lost at each transfer: E/(1 − ρ/2), not E/(1 − ρ).
+    close(seen(&light, DVec3::splat(0.5), DVec3::new(0.2, -1.0, 0.1)), [1.0 / 0.75; 3], 5e-3);
+}
+
+#[test]
+fn punctual_lights_follow_their_laws() {
+    let mut room = Room::default();
+    let white = room.material(Material::diffuse(Vec3::ONE));
+    room.quad(DVec3::new(-2.0, 0.0, -2.0), DVec3::Z * 4.0, DVec3::X * 4.0, white);
+    let lamp = |kind, intensity: f32| PunctualLight {
+        kind,
+        position: Vec3::new(0.0, 2.0, 0.0),
+        direction: Vec3::NEG_Y,
+        intensity: Vec3::splat(intensity),
+        range: f32::INFINITY,
+    };
+    let floor_at = |scene: &Scene, x: f64| {
+        let bvh = SceneBvh::new(scene);
+        let light = lit(&bvh, IlluminationSettings::default());
+        seen(&light, DVec3::new(x, 1.0, 0.1), DVec3::NEG_Y)
+    };
+    room.scene.lights = vec![lamp(LightKind::Point, 8.0)];
+    let r2 = 1.0 + 0.01 + 4.0;
+    close(floor_at(&room.scene, 1.0), [8.0 / r2 * (2.0 / f64::sqrt(r2)) / PI; 3], 1e-4);
+    room.scene.lights = vec![lamp(LightKind::Directional, 3.0)];
+    close(floor_at(&room.scene, 1.0), [3.0 / PI; 3], 1e-5);
+    room.scene.lights = vec![lamp(LightKind::Spot { inner: 0.2, outer: 0.3 }, 8.0)];
+    let r2 = 0.2 * 0.2 + 0.01 + 4.0;
+    close(floor_at(&room.scene, 0.2), [8.0 / r2 * (2.0 / f64::sqrt(r2)) / PI; 3], 1e-4);
+    assert_eq!(floor_at(&room.scene, 1.5), Vec3::ZERO);
+}
+
+#[test]
+fn walls_without_thickness_keep_light_in() {
+    // Two cells side by side on one floor, divided by a single two-sided sheet; one has a lamp. The floor's triangles
+    // run under the sheet. The dark cell must stay dark.
+    let mut room = Room::default();
+    let white = room.material(Material::diffuse(Vec3::splat(0.8)));
+    let sheet = room.material(Material { double_sided: true, ..Material::diffuse(Vec3::splat(0.8)) });
+    let lamp = room.material(Material::emitter(Vec3::splat(10.0)));
+    room.cuboid(DVec3::ZERO, DVec3::new(2.0, 1.0, 1.0), true, [white; 6]);
+    room.quad(DVec3::new(0.93, 0.0, 0.0), DVec3::Z, DVec3::Y, sheet);
+    room.quad(DVec3::new(0.3, 0.999, 0.4), DVec3::X * 0.2, DVec3::Z * 0.2, lamp);
+    let bvh = SceneBvh::new(&room.scene);
+    let light = lit(&bvh, IlluminationSettings::default());
+    let bright = seen(&light, DVec3::new(0.5, 0.5, 0.5), DVec3::NEG_Y).x;
+    for i in 0..40 {
+        let x = 0.931 + 0.02 * f64::from(i);
+        let dark = seen(&light, DVec3::new(x, 0.5, 0.31), DVec3::NEG_Y).x;
+        assert!(dark < 1e-4 * bright, "{dark} of {bright} leaks to x = {x}");
+        let lit_side = seen(&light, DVec3::new(0.929 - 0.02 * f64::from(i), 0.5, 0.31), DVec3::NEG_Y).x;
+        assert!(lit_side > 0.1 * bright);
+    }
+}
+
+#[test]
+fn an_emitter_that_looks_away_and_a_dark_scene() {
+    let mut room = Room::default();
+    let white = room.material(Material::diffuse(Vec3::ONE));
+    let lamp = room.material(Material::emitter(Vec3::ONE));
+    room.quad(DVec3::new(-1.0, 0.0, -1.0), DVec3::Z * 2.0, DVec3::X * 2.0, white);
+    let bvh = SceneBvh::new(&room.scene);
+    assert!(lit(&bvh, IlluminationSettings::default()).is_dark());
+    drop(bvh);
+    // u × v = +y: it shines upwards, away from the floor.
+    room.quad(DVec3::new(-0.5, 1.0, -0.5), DVec3::Z, DVec3::X, lamp);
+    let bvh = SceneBvh::new(&room.scene);
+    let light = lit(&bvh, IlluminationSettings::default());
+    assert!(!light.is_dark());
+    assert_eq!(seen(&light, DVec3::new(0.0, 0.5, 0.0), DVec3::NEG_Y), Vec3::ZERO);
+    let energy = light.report().energy;
+    close(energy.escaped / energy.emitted, [1.0; 3], 1e-5);
+}
+
+#[test]
+fn threads_do_not_change_the_light() {
+    let mut room = Room::default();
+    let m = room.material(glowing([0.5, 0.6, 0.7], [0.0; 3]));
+    let lamp = room.material(Material::emitter(Vec3::splat(3.0)));
+    room.cuboid(DVec3::ZERO, DVec3::ONE, true, [m; 6]);
+    room.cuboid(DVec3::splat(0.3), DVec3::splat(0.5), false, [m; 6]);
+    room.quad(DVec3::new(0.4, 0.99, 0.4), DVec3::X * 0.2, DVec3::Z * 0.2, lamp);
+    let bvh = SceneBvh::new(&room.scene);
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            lit(&bvh, IlluminationSettings { indirect_rays: 256, ..IlluminationSettings::default() }).irradiance
+        })
+    };
+    assert_eq!(with(1), with(3));
+}
+
+#[test]
+fn settings_outside_their_domain_are_refused() {
+    let scene = Scene::default();
+    let bvh = SceneBvh::new(&scene);
+    let refused = |settings| Illumination::new(&bvh, settings, &Progress::new()).is_err();
+    let good = IlluminationSettings::default();
+    assert!(refused(IlluminationSettings { residual: f64::NAN, ..good }));
+    assert!(refused(IlluminationSettings { shadow_rays: 0, ..good }));
+    assert!(refused(IlluminationSettings { shortest_element: 0.5, ..good }));
+    assert!(!refused(good), "an empty scene is dark, not wrong");
+}

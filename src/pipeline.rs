@@ -1,0 +1,303 @@
+//! The whole way, on one screen: a scene becomes points, points a field, a field a frame, a frame light again.
+//!
+//! Each function is one arrow of the picture in the crate's documentation; [`run`] walks them all.
+
+use crate::encode::{self, EncodeSettings, Encoded};
+use crate::error::{Error, Result};
+use crate::field::{Complex32, Field, Grid};
+use crate::hologram::{self, Computed, HologramSettings};
+use crate::illumination::{Illumination, IlluminationReport, IlluminationSettings};
+use crate::panel::simulated::{self, Simulation};
+use crate::panel::{Frame, PanelProfile};
+use crate::points::placement::{Phase, Placing, WorldPoint};
+use crate::points::trace::{self, TraceReport, TraceSettings};
+use crate::points::{self, Channel, Placed, Placement, PointCloud};
+use crate::progress::Progress;
+use crate::propagation::Aperture;
+use crate::reconstruction::ViewSettings;
+use crate::scene::{SceneBvh, gltf};
+use std::path::Path;
+
+/// How a scene becomes points.
+#[derive(Clone, Debug)]
+pub struct SceneSettings {
+    /// Camera, animation.
+    pub load: gltf::LoadOptions,
+    /// Radiosity and direct light.
+    pub illumination: IlluminationSettings,
+    /// Rays.
+    pub trace: TraceSettings,
+    /// Where the scene stands before the panel.
+    pub placement: Placement,
+    /// Initial phase of the points.
+    pub phase: Phase,
+    /// What is done with light brighter than a picture's white.
+    pub exposure: Exposure,
+}
+
+/// What a hologram does with light that a picture shows as white and brighter.
+///
+/// A lamp is a hundred times brighter than the wall that it lights. Kept so, it takes most of the panel's light and
+/// its whole dynamic range; a photographer lets it burn out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Exposure {
+    /// Radiance is kept as it is.
+    #[default]
+    Full,
+    /// Luminance is clipped at [`white_level`] of the picture, colour kept; what is lost is reported.
+    Auto,
+    /// Luminance is clipped at this value [W/(m² sr)].
+    White(f32),
+}
+
+impl Default for SceneSettings {
+    fn default() -> Self {
+        Self {
+            load: gltf::LoadOptions::default(),
+            illumination: IlluminationSettings::default(),
+            trace: TraceSettings::default(),
+            placement: Placement::default(),
+            phase: Phase::Random { seed: 1 },
+            exposure: Exposure::Full,
+        }
+    }
+}
+
+/// A scene's light as points, and what an eye sees of it.
+#[derive(Clone, Debug)]
+pub struct Lit {
+    /// The points before the panel.
+    pub placed: Placed,
+    /// The same points where the camera's rays put them [m].
+    pub world: Vec<WorldPoint>,
+    /// What the viewer should see.
+    pub view: SceneView,
+    /// What the radiosity took, and its energy.
+    pub illumination: IlluminationReport,
+    /// What the rays took.
+    pub trace: TraceReport,
+    /// Luminance that was taken as white, if light beyond it was clipped.
+    pub white: Option<f32>,
+    /// Part of the light (0 to 1) that was clipped.
+    pub clipped_light: f64,
+    /// What had to be assumed.
+    pub warnings: Vec<String>,
+}
+
+/// The traced picture and where each of its pixels stands before the panel: the target of every reconstruction.
+#[derive(Clone, Debug)]
+pub struct SceneView {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Linear RGB radiance, row 0 on top.
+    pub picture: Vec<[f32; 3]>,
+    /// Depth z of each pixel's point in the hologram frame [m]; a pixel without a point has that of the nearest one.
+    pub depths: Vec<Option<f64>>,
+    /// Depths worth focusing on, z [m]: nearest and farthest object, mirror image.
+    pub focus: Vec<(String, f64)>,
+    /// Eye, window and camera.
+    pub placing: Placing,
+}
+
+/// glTF → light on surfaces → points before the panel.
+pub fn light(
+    scene: &Path,
+    settings: &SceneSettings,
+    panel: &Grid,
+    wavelength: f64,
+    progress: &Progress,
+) -> Result<Lit> {
+    progress.start("scene", 0);
+    let loaded = gltf::load(scene, &settings.load)?;
+    let camera = loaded.scene.cameras.first().ok_or_else(|| Error::input(scene, "has no camera"))?;
+    let aspect = f64::from(settings.trace.width) / f64::from(settings.trace.height);
+    let placing = settings.placement.prepare(&loaded.scene, camera, aspect, panel)?;
+    let bvh = SceneBvh::new(&loaded.scene);
+    let illumination = Illumination::new(&bvh, settings.illumination.clone(), progress)?;
+    let traced = trace::trace(&illumination, &placing.camera, &settings.trace, progress)?;
+    if traced.points.is_empty() {
+        let what = if illumination.is_dark() {
+            "its lights give no light; raise their intensity or emission"
+        } else {
+            "no ray of its camera meets light; look at the camera and the lights"
+        };
+        return Err(Error::input(scene, what));
+    }
+    let mut world: Vec<WorldPoint> =
+        traced.points.iter().map(|p| WorldPoint { position: p.position, radiance: p.radiance }).collect();
+    let white = match settings.exposure {
+        Exposure::Full => None,
+        Exposure::Auto => Some(white_level(&traced.picture)),
+        Exposure::White(white) if white.is_finite() && white > 0.0 => Some(white),
+        Exposure::White(white) => return Err(Error::parameter("white", format!("{white} must be greater than zero"))),
+    };
+    let clipped_light = white.map_or(0.0, |white| expose(&mut world, white));
+    let placed = points::place(&world, &placing, settings.phase, panel, wavelength);
+    let view = SceneView::new(&traced, &placed, placing);
+    let warnings = loaded.warnings.iter().map(ToString::to_string).collect();
+    Ok(Lit {
+        placed,
+        world,
+        view,
+        illumination: illumination.report().clone(),
+        trace: traced.report,
+        white,
+        clipped_light,
+        warnings,
+    })
+}
+
+/// Luminance that pictures of a scene show as white: a quarter above what 97 % of its lit pixels do not pass.
+pub fn white_level(picture: &[[f32; 3]]) -> f32 {
+    let mut lit: Vec<f32> = picture.iter().map(|rgb| Channel::Luminance.of(*rgb)).filter(|l| *l > 0.0).collect();
+    lit.sort_by(f32::total_cmp);
+    lit.get(lit.len() * 97 / 100).map_or(1.0, |level| 1.25 * level)
+}
+
+/// Clips the points' luminance at `white`, hue kept; returns the part of the light that is lost.
+fn expose(points: &mut [WorldPoint], white: f32) -> f64 {
+    let (mut all, mut lost) = (0.0, 0.0);
+    for point in points {
+        let luminance = Channel::Luminance.of(point.radiance);
+        all += f64::from(luminance);
+        if luminance > white {
+            lost += f64::from(luminance - white);
+            point.radiance = point.radiance.map(|c| c * (white / luminance));
+        }
+    }
+    if all > 0.0 { lost / all } else { 0.0 }
+}
+
+/// Points → field on the panel, by the engine that the planner chooses.
+pub fn field(
+    cloud: &PointCloud,
+    channel: Channel,
+    panel: &Grid,
+    wavelength: f64,
+    settings: &HologramSettings,
+    progress: &Progress,
+) -> Result<Computed> {
+    let points = cloud.channel(channel);
+    let plan = hologram::plan(&points, panel, wavelength, settings)?;
+    hologram::compute(&points, panel, wavelength, &plan, progress)
+}
+
+/// Field → frame of drive levels for a panel.
+pub fn frame(field: &Field, panel: &PanelProfile, settings: &EncodeSettings, progress: &Progress) -> Result<Encoded> {
+    encode::encode(field, panel, settings, progress)
+}
+
+/// Frame → the object's field behind the simulated panel, and the stop that keeps its other orders out.
+///
+/// The encoding's scale is divided out, so that intensities are those of the field that was encoded.
+pub fn simulated_light(frame: &Frame, settings: &Simulation, progress: &Progress) -> Result<(Field, ViewSettings)> {
+    let mut field = simulated::simulate(frame, settings, progress)?;
+    let mut view = ViewSettings::default();
+    if let Some(encoding) = &frame.metadata.encoding {
+        view.aperture = encoding.aperture;
+        if encoding.scale.is_finite() && encoding.scale > 0.0 {
+            let gain = (1.0 / encoding.scale) as f32;
+            field.samples.iter_mut().for_each(|u: &mut Complex32| *u *= gain);
+        }
+    }
+    Ok((field, view))
+}
+
+/// What came out of the whole way.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Points and picture.
+    pub lit: Lit,
+    /// Field on the panel.
+    pub computed: Computed,
+    /// Frame for the panel.
+    pub encoded: Encoded,
+    /// Field behind the simulated panel.
+    pub behind: Field,
+    /// Stop in the Fourier plane through which it is looked at.
+    pub aperture: Option<Aperture>,
+}
+
+/// Scene → points → field → frame → light behind the simulated panel.
+pub fn run(
+    scene: &Path,
+    profile: &PanelProfile,
+    wavelength: f64,
+    settings: (&SceneSettings, &HologramSettings, &EncodeSettings),
+    progress: &Progress,
+) -> Result<Outcome> {
+    let grid = profile.grid()?;
+    let lit = light(scene, settings.0, &grid, wavelength, progress)?;
+    let computed = field(&lit.placed.cloud, Channel::Luminance, &grid, wavelength, settings.1, progress)?;
+    let encoded = frame(&computed.field, profile, settings.2, progress)?;
+    let (behind, view) = simulated_light(&encoded.frame, &Simulation::default(), progress)?;
+    Ok(Outcome { lit, computed, encoded, behind, aperture: view.aperture })
+}
+
+impl SceneView {
+    fn new(traced: &trace::Traced, placed: &Placed, placing: Placing) -> Self {
+        let mut depths = vec![None; traced.picture.len()];
+        for (point, at) in traced.points.iter().zip(&placed.cloud.points) {
+            depths[point.pixel as usize] = Some(at.position.z);
+        }
+        spread(&mut depths, traced.width as usize);
+        Self {
+            width: traced.width as usize,
+            height: traced.height as usize,
+            picture: traced.picture.clone(),
+            depths,
+            focus: focus_depths(traced, placed),
+            placing,
+        }
+    }
+}
+
+/// Gives pixels without a depth that of the nearest pixel that has one (counted in steps across and down).
+fn spread(depths: &mut [Option<f64>], width: usize) {
+    let mut front: std::collections::VecDeque<usize> = (0..depths.len()).filter(|&i| depths[i].is_some()).collect();
+    while let Some(at) = front.pop_front() {
+        let (column, last) = (at % width, depths.len() - 1);
+        let left = (column > 0).then(|| at - 1);
+        let right = (column + 1 < width && at < last).then(|| at + 1);
+        let (up, down) = (at.checked_sub(width), Some(at + width).filter(|&d| d <= last));
+        for next in [left, right, up, down].into_iter().flatten() {
+            if depths[next].is_none() {
+                depths[next] = depths[at];
+                front.push_back(next);
+            }
+        }
+    }
+}
+
+/// Depths of the nearest and the farthest object that fills at least 1 % of the picture, and of mirror images.
+fn focus_depths(traced: &trace::Traced, placed: &Placed) -> Vec<(String, f64)> {
+    let mut by_object = std::collections::BTreeMap::<u32, Vec<f64>>::new();
+    let mut mirrored = Vec::new();
+    for (point, at) in traced.points.iter().zip(&placed.cloud.points) {
+        if point.bounces > 0 {
+            mirrored.push(at.position.z);
+        } else {
+            by_object.entry(point.instance).or_default().push(at.position.z);
+        }
+    }
+    let enough = traced.points.len() / 100;
+    let median = |depths: &mut Vec<f64>| {
+        depths.sort_by(f64::total_cmp);
+        depths[depths.len() / 2]
+    };
+    let mut objects: Vec<f64> = by_object.values_mut().filter(|d| d.len() > enough).map(median).collect();
+    objects.sort_by(f64::total_cmp);
+    let mut focus = Vec::new();
+    if let (Some(&far), Some(&near)) = (objects.first(), objects.last()) {
+        focus.push(("near".to_string(), near));
+        if far < near {
+            focus.push(("far".to_string(), far));
+        }
+    }
+    if mirrored.len() > enough {
+        focus.push(("mirror".to_string(), median(&mut mirrored)));
+    }
+    focus
+}

@@ -1,0 +1,260 @@
+//! The binary as a user meets it: the README's commands, and bad input.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn holodrive(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_holodrive")).args(arguments).current_dir(folder).output().expect("runs")
+}
+
+fn scene(name: &str) -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).display().to_string()
+}
+
+/// Files in a folder, hidden ones too.
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .expect("folder")
+        .map(|e| e.expect("entry").file_name().to_string_lossy().to_string())
+        .collect();
+    names.sort();
+    names
+}
+
+/// Bad input ends in exit code 2, one line on standard error that says `expected`, and no new file.
+fn refused(folder: &Path, arguments: &[&str], expected: &str) {
+    let before = names(folder);
+    let out = holodrive(folder, arguments);
+    let said = String::from_utf8_lossy(&out.stderr);
+    let lines: Vec<&str> = said.lines().filter(|l| !l.starts_with("warning:")).collect();
+    assert_eq!(out.status.code(), Some(2), "{arguments:?}: {said}");
+    assert_eq!(lines.len(), 1, "{arguments:?} said more than one line: {said}");
+    assert!(lines[0].contains(expected), "{arguments:?} did not say `{expected}`: {said}");
+    assert_eq!(names(folder), before, "{arguments:?} left something");
+}
+
+fn write(folder: &Path, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
+    let path = folder.join(name);
+    fs::write(&path, bytes).expect("write");
+    path
+}
+
+/// A triangle as a glTF with its buffer embedded; `positions` are nine floats.
+fn triangle_gltf(positions: [f32; 9], count: usize, emissive: &str) -> String {
+    let bytes: Vec<u8> = positions.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let alphabet = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let base64: String = bytes
+        .chunks(3)
+        .flat_map(|c| {
+            let word = u32::from(c[0]) << 16 | u32::from(c[1]) << 8 | u32::from(c[2]);
+            [18, 12, 6, 0].map(|shift| alphabet[(word >> shift & 63) as usize] as char)
+        })
+        .collect();
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"material":0}}]}}],
+        "materials":[{{"emissiveFactor":{emissive},"doubleSided":true}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":{count},"type":"VEC3","min":[0,0,0],"max":[1,1,0]}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}}],
+        "buffers":[{{"byteLength":36,"uri":"data:application/octet-stream;base64,{base64}"}}]}}"#
+    )
+}
+
+const TRIANGLE: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+
+#[test]
+fn bad_scenes_end_in_one_line() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    refused(f, &["points", "missing.gltf"], "missing.gltf");
+    refused(f, &["show", "missing.gltf"], "missing.gltf");
+    refused(f, &["show", "missing.xyz"], "not a kind of file");
+    // A .glb whose file ends in the middle of its chunks.
+    let mut glb = b"glTF\x02\x00\x00\x00\xff\x00\x00\x00\xc0\x00\x00\x00JSON{\"asset\"".to_vec();
+    write(f, "cut.glb", &glb);
+    refused(f, &["points", "cut.glb"], "cut.glb");
+    glb.truncate(7);
+    write(f, "cut.glb", &glb);
+    refused(f, &["points", "cut.glb"], "cut.glb");
+    write(f, "past.gltf", triangle_gltf(TRIANGLE, 300, "[1,1,1]"));
+    refused(f, &["points", "past.gltf"], "past.gltf");
+    let mut bad = TRIANGLE;
+    bad[4] = f32::NAN;
+    write(f, "nan.gltf", triangle_gltf(bad, 3, "[1,1,1]"));
+    refused(f, &["points", "nan.gltf"], "nan.gltf");
+    bad[4] = f32::INFINITY;
+    write(f, "inf.gltf", triangle_gltf(bad, 3, "[1,1,1]"));
+    refused(f, &["show", "inf.gltf"], "inf.gltf");
+    write(f, "flat.gltf", triangle_gltf([0.0; 9], 3, "[1,1,1]"));
+    refused(f, &["points", "flat.gltf"], "triangle");
+    write(f, "none.gltf", r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[]}]}"#);
+    refused(f, &["points", "none.gltf"], "triangle");
+    // A light that gives none.
+    let dark = triangle_gltf(TRIANGLE, 3, "[0,0,0]").replace(
+        r#""nodes":[{"mesh":0}]"#,
+        r#""nodes":[{"mesh":0,"extensions":{"KHR_lights_punctual":{"light":0}}}],
+        "extensionsUsed":["KHR_lights_punctual"],
+        "extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":0}]}}"#,
+    );
+    write(f, "dark.gltf", dark);
+    refused(f, &["points", "dark.gltf"], "light");
+    let foreign = triangle_gltf(TRIANGLE, 3, "[1,1,1]").replace(
+        r#""scene":0"#,
+        r#""extensionsUsed":["X_unheard_of"],"extensionsRequired":["X_unheard_of"],"scene":0"#,
+    );
+    write(f, "foreign.gltf", foreign);
+    refused(f, &["points", "foreign.gltf"], "X_unheard_of");
+}
+
+#[test]
+fn bad_clouds_fields_and_frames_end_in_one_line() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    let head =
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    for (name, body, expected) in [
+        ("short.ply", "0 0 -0.2\n", "promises 2"),
+        ("nan.ply", "0 0 -0.2\nnan 0 -0.2\n", "not finite"),
+        ("inf.ply", "0 0 -0.2\n0 inf -0.2\n", "not finite"),
+    ] {
+        write(f, name, format!("{head}{body}"));
+        refused(f, &["compute", name], expected);
+        refused(f, &["show", name, "-o", "."], expected);
+    }
+    let dark = head.replace("end_header", "property float amplitude\nend_header");
+    write(f, "dark.ply", format!("{dark}0 0 -0.2 0\n0 0 -0.2 0\n"));
+    refused(f, &["compute", "dark.ply"], "dark");
+    write(f, "field.npy", b"\x93NUMPY\x01\x00");
+    refused(f, &["encode", "field.npy"], "field.npy");
+    refused(f, &["propagate", "field.npy", "--distance", "1m", "-o", "out.npy"], "field.npy");
+    refused(f, &["reconstruct", "field.npy", "--distance", "1m"], "field.npy");
+    write(f, "frame.png", b"\x89PNG\r\n\x1a\nrest");
+    refused(f, &["reconstruct", "frame.png", "--distance", "1m"], "frame.png");
+    refused(f, &["compute", "a.png+b.png"], "a.png");
+}
+
+#[test]
+fn bad_profiles_and_flags_end_in_one_line() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    let cloud = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 -0.2\n";
+    write(f, "p.ply", cloud);
+    let good = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("calib/generic.toml")).expect("profile");
+    for (name, text, expected) in [
+        ("misspelt.toml", good.replace("fill_factor", "fil_factor"), "fil_factor"),
+        ("zero.toml", good.replace("\"8um\"", "\"0um\""), "pitch"),
+        ("unit.toml", good.replace("\"8um\"", "\"8\""), "unit"),
+        ("number.toml", good.replace("\"8um\"", "8"), "unit"),
+    ] {
+        write(f, name, text);
+        refused(f, &["compute", "p.ply", "--panel", name], expected);
+        refused(f, &["show", "p.ply", "--panel", name], expected);
+    }
+    refused(f, &["compute", "p.ply", "--panel", "no-such-panel"], "no-such-panel");
+    refused(f, &["compute", "p.ply", "--wavelength", "633"], "unit");
+    refused(f, &["compute", "p.ply", "--wavelength=-633nm"], "greater than zero");
+    refused(f, &["compute", "p.ply", "--error", "nan"], "error");
+    refused(f, &["points", &scene("cornell.gltf"), "--rays", "0x500"], "500x500");
+    refused(f, &["points", &scene("cornell.gltf"), "--camera", "nobody"], "nobody");
+    refused(f, &["points", &scene("cornell.gltf"), "--near", "200mm", "--far", "100mm"], "far");
+    refused(f, &["reconstruct", "frame.png"], "--distance");
+    refused(f, &["frobnicate"], "frobnicate");
+    refused(f, &[], "command");
+    refused(f, &["compute", "p.ply", "-o", "no/such/folder/field.npy"], "no/such/folder");
+    write(f, "file", "not a folder");
+    refused(f, &["show", "p.ply", "-o", "file/out"], "file/out");
+}
+
+#[test]
+fn a_reference_that_aliases_is_refused_with_numbers() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    let cloud = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 -0.002\n";
+    write(f, "p.ply", cloud);
+    let generic =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("calib/generic.toml")).expect("profile");
+    // Wavelength beyond twice the pitch: every direction is on the grid, but not the sum of object and reference.
+    let fine = generic
+        .replace("\"8um\"", "\"0.3um\"")
+        .replace("width = 1920", "width = 64")
+        .replace("height = 1080", "height = 48");
+    write(f, "fine.toml", fine);
+    let small = generic.replace("width = 1920", "width = 64").replace("height = 1080", "height = 48");
+    write(f, "small.toml", small);
+    for panel in ["fine.toml", "small.toml"] {
+        let made = holodrive(f, &["compute", "p.ply", "--panel", panel, "-o", "field.npy"]);
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        let encode =
+            ["encode", "field.npy", "--panel", panel, "--method", "off-axis-bipolar", "--reference-angle", "85deg"];
+        refused(f, &encode, "limit");
+    }
+}
+
+#[test]
+fn reports_are_json_and_help_has_examples() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    let arguments =
+        ["points", &scene("depth-chart.gltf"), "--rays", "40x30", "--json", "-o", "p.ply", "--picture", "t.npy"];
+    let out = holodrive(f, &arguments);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let report: serde_json::Value = serde_json::from_slice(&out.stdout).expect("JSON");
+    assert!(report["points"].as_u64().expect("points") > 20);
+    assert_eq!(report["command"], "points");
+    assert!(f.join("p.ply").is_file() && f.join("t.npy").is_file());
+    for command in ["points", "compute", "propagate", "encode", "reconstruct", "show"] {
+        let help = holodrive(f, &[command, "--help"]);
+        let text = String::from_utf8_lossy(&help.stdout).to_string();
+        assert!(help.status.success() && text.contains(&format!("holodrive {command} ")), "{text}");
+    }
+}
+
+/// Commands in the README's `sh` blocks, in their order.
+fn readme_commands() -> Vec<String> {
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md");
+    let mut commands = Vec::new();
+    let mut inside = false;
+    for line in text.lines() {
+        if let Some(kind) = line.trim().strip_prefix("```") {
+            inside = kind == "sh";
+        } else if inside && !line.trim().is_empty() && !line.trim().starts_with('#') {
+            commands.push(line.split(" #").next().unwrap_or("").trim().to_string());
+        }
+    }
+    commands
+}
+
+#[test]
+fn every_command_of_the_readme_runs() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for name in ["scenes", "calib"] {
+        fs::create_dir(f.join(name)).expect("folder");
+        for entry in fs::read_dir(root.join(name)).expect("folder") {
+            let path = entry.expect("entry").path();
+            fs::copy(&path, f.join(name).join(path.file_name().expect("name"))).expect("copy");
+        }
+    }
+    let commands = readme_commands();
+    assert!(commands.len() >= 8, "{commands:?}");
+    for command in commands {
+        let words: Vec<&str> = command.split_whitespace().collect();
+        let arguments = match words.as_slice() {
+            ["holodrive", rest @ ..] | ["cargo", "run", "--release", "--", rest @ ..] => rest,
+            // The test suite is not run inside itself.
+            ["tests/run"] | ["cargo", "install", ..] => continue,
+            _ => panic!("README.md has a command that this test does not know: {command}"),
+        };
+        let out = holodrive(f, arguments);
+        assert!(out.status.success(), "{command}: {}", String::from_utf8_lossy(&out.stderr));
+    }
+    for name in ["traced.png", "points.ply", "field.npy", "frame.png", "report.json", "reconstruction-sharp.png"] {
+        assert!(
+            f.join("holodrive-out").join(name).is_file(),
+            "{name} is missing: {:?}",
+            names(&f.join("holodrive-out"))
+        );
+    }
+}

@@ -1,0 +1,12 @@
+//! The glTF loader: our own scenes, what the format can say, malformed files, and third-party files.
+//!
+//! `make_scenes.py` in this folder wrote the scenes in `scenes/`.
+
+mod animation;
+mod builder;
+mod features;
+mod fuzz;
+mod malformed;
+mod materials;
+mod own_scenes;
+mod third_party;
