@@ -21,13 +21,13 @@ pub struct BandGradient {
     pub iterations: usize,
     /// Largest step of a pixel's phase [rad].
     pub step: f64,
-    /// Start from the double-phase pattern with this normalisation (see [`DoublePhase::percentile`]).
-    pub percentile: f64,
+    /// Normalisation of the double-phase pattern from which it starts (see [`DoublePhase::percentile`]).
+    pub percentile: Option<f64>,
 }
 
 impl Default for BandGradient {
     fn default() -> Self {
-        Self { band: [0.5, 0.5], iterations: 60, step: 0.1, percentile: 0.95 }
+        Self { band: [0.5, 0.5], iterations: 60, step: 0.1, percentile: None }
     }
 }
 

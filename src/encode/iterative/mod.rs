@@ -136,7 +136,7 @@ impl Quantiser {
         let span = curve.range();
         let step = span / (curve.levels().max(2) - 1) as f64;
         let low = curve.values().iter().fold(f64::INFINITY, |low, &v| low.min(v));
-        (std::f64::consts::TAU - span > 8.0 * step).then(|| Range { low: low as f32, high: (low + span) as f32 })
+        (std::f64::consts::TAU - span > 8.0 * step).then_some(Range { low: low as f32, high: (low + span) as f32 })
     }
 
     /// Phase [rad] in [0, 2π) and phasor that the panel shows for a wished phase [rad].

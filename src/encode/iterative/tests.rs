@@ -22,7 +22,7 @@ fn picture(grid: Grid, z: f64, columns: std::ops::Range<usize>, seed: f32) -> Ta
     let value = |i: usize| {
         let (x, y) = ((i % grid.width) as f32, (i / grid.width) as f32);
         let wave = 0.5 + 0.3 * (0.11 * x + seed).sin() * (0.13 * y - 0.7 * seed).cos();
-        if (x as usize / 12 + y as usize / 12) % 3 == 0 { 1.0 } else { wave }
+        if (x as usize / 12 + y as usize / 12).is_multiple_of(3) { 1.0 } else { wave }
     };
     let amplitude = (0..grid.len()).map(|i| if inside(i) { value(i) } else { 0.0 }).collect();
     let weight = (0..grid.len()).map(|i| if inside(i) { 1.0 } else { 0.0 }).collect();

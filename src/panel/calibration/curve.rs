@@ -40,7 +40,8 @@ pub fn sweep_frame(profile: &PanelProfile, wavelength: f64, fixed: u16, level: u
     if stripe == 0 {
         return Err(Error::parameter("stripe", "0 columns; take at least one, a few against crosstalk"));
     }
-    let row: Vec<u16> = (0..profile.width).map(|x| if x / stripe % 2 == 0 { fixed } else { level }).collect();
+    let row: Vec<u16> =
+        (0..profile.width).map(|x| if (x / stripe).is_multiple_of(2) { fixed } else { level }).collect();
     let mut frame = Frame::new(profile, wavelength, row.repeat(profile.height))?;
     frame.metadata.origin.notes = vec![format!("calibration grating: levels {fixed} and {level}, stripes of {stripe}")];
     Ok(frame)
@@ -189,12 +190,8 @@ fn polynomial(x: &[f64], y: &[f64], degree: usize) -> Vec<f64> {
     let mut normal = vec![vec![0.0; degree]; degree];
     let mut right = vec![0.0; degree];
     for (&x, &y) in x.iter().zip(y) {
-        for i in 0..degree {
-            right[i] += x.powi(i as i32 + 1) * y;
-            for j in 0..degree {
-                normal[i][j] += x.powi((i + j) as i32 + 2);
-            }
-        }
+        let powers: Vec<f64> = (1..=degree).map(|i| x.powi(i as i32)).collect();
+        add_equation(&mut normal, &mut right, &powers, y);
     }
     solve(&mut normal, &mut right).unwrap_or_else(|| {
         let mut line = vec![0.0; degree];
@@ -218,12 +215,7 @@ fn refine(x: &[f64], y: &[f64], parameters: &mut [f64], degree: usize) -> Option
             let mut slopes: Vec<f64> = (1..=degree).map(|i| 0.5 * p[degree] * phase.sin() * x.powi(i as i32)).collect();
             slopes.extend([(0.5 * phase).sin().powi(2), 1.0]);
             let miss = y - p[degree + 1] - p[degree] * slopes[degree];
-            for i in 0..count {
-                right[i] += slopes[i] * miss;
-                for j in 0..count {
-                    normal[i][j] += slopes[i] * slopes[j];
-                }
-            }
+            add_equation(&mut normal, &mut right, &slopes, miss);
         }
         (normal, right)
     };
@@ -261,6 +253,16 @@ fn refine(x: &[f64], y: &[f64], parameters: &mut [f64], degree: usize) -> Option
         })
         .collect();
     columns
+}
+
+/// Adds one equation Σ factorᵢ·unknownᵢ = value to the normal equations.
+fn add_equation(normal: &mut [Vec<f64>], right: &mut [f64], factors: &[f64], value: f64) {
+    for ((row, right), a) in normal.iter_mut().zip(right).zip(factors) {
+        *right += a * value;
+        for (cell, b) in row.iter_mut().zip(factors) {
+            *cell += a * b;
+        }
+    }
 }
 
 /// Gaussian elimination with pivots; `None` for a singular matrix.

@@ -16,7 +16,7 @@ pub fn noll(j: usize) -> (u32, i32) {
     let (degree, place) = (n - 1, j - before - 1);
     // Within a degree |m| rises by two every second term (every term but the first when the degree is even).
     let m = if degree % 2 == 0 { 2 * place.div_ceil(2) } else { 2 * (place / 2) + 1 };
-    let sign = if j % 2 == 0 { 1 } else { -1 };
+    let sign = if j.is_multiple_of(2) { 1 } else { -1 };
     (degree as u32, sign * m as i32)
 }
 
