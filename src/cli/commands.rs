@@ -1,288 +1,26 @@
 //! The steps, one by one.
 
 use super::args::{
-    ChannelArg, ComputeArgs, DepthArg, EncodeArgs, EncodingArgs, EngineArg, FormFactorArg, FrameArg, HologramArgs,
-    KernelArg, MonitorsArgs, PanelArgs, PhaseArg, PlacementArg, PlacementArgs, PointsArgs, PropagateArgs,
-    ReconstructArgs, SceneArgs, White,
+    ComputeArgs, EncodeArgs, EncodingArgs, FrameArg, KernelArg, PointsArgs, PropagateArgs, ReconstructArgs, White,
 };
 use super::bar::Bar;
-use super::report::{Report, count, seconds};
+use super::load::{Input, Panel, channel, hologram_settings, input, load_points, panel, white_of};
+use super::report::{Report, seconds};
 use glam::DVec2;
 use holodrive::encode::{EncodeSettings, Encoding, Reference};
-use holodrive::field::{Field, Grid, npy};
-use holodrive::hologram::{Computed, HologramSettings, Method};
-use holodrive::illumination::{FormFactor, IlluminationSettings};
+use holodrive::field::{Field, npy};
+use holodrive::hologram::Computed;
 use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Frame, Modulation, Origin, PanelProfile};
-use holodrive::pipeline::{self, Exposure, Lit, SceneSettings};
-use holodrive::points::placement::Phase;
-use holodrive::points::trace::TraceSettings;
-use holodrive::points::{Channel, Placement, PointCloud, images, ply};
+use holodrive::pipeline::{self, Lit};
+use holodrive::points::{PointCloud, ply};
 use holodrive::progress::Progress;
 use holodrive::propagation::{self, Kernel, Propagator};
 use holodrive::reconstruction::{self, Picture, Scale, View, ViewSettings, write_rgb_png};
-use holodrive::scene::gltf::{Choice, Clip, LoadOptions};
 use holodrive::units::{self, show_length};
 use holodrive::{Error, Result};
-use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
-
-/// A panel profile with the wavelength that it is used at.
-pub(super) struct Panel {
-    pub(super) profile: PanelProfile,
-    pub(super) grid: Grid,
-    pub(super) wavelength: f64,
-}
-
-pub(super) fn panel(args: &PanelArgs, report: &mut Report) -> Result<Panel> {
-    let profile = PanelProfile::find(&args.panel)?;
-    report.warn(profile.warnings());
-    let wavelength = args.wavelength.unwrap_or(profile.default_wavelength());
-    let grid = profile.grid()?;
-    report.add("panel", profile.name.clone(), "");
-    report.add("wavelength", wavelength, "");
-    Ok(Panel { profile, grid, wavelength })
-}
-
-pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, default_white: White) -> SceneSettings {
-    let form_factor = match light.form_factor {
-        FormFactorArg::Exact => FormFactor::Lambert,
-        FormFactorArg::Paper => FormFactor::Paper,
-    };
-    SceneSettings {
-        load: LoadOptions {
-            camera: light.camera.as_deref().map(Choice::from),
-            clip: light.animation.as_deref().map_or(Clip::First, |name| Clip::Of(Choice::from(name))),
-            time: light.time,
-            ..LoadOptions::default()
-        },
-        illumination: IlluminationSettings {
-            form_factor,
-            bounces: light.bounces,
-            seed: light.seed,
-            ..IlluminationSettings::default()
-        },
-        trace: TraceSettings {
-            width: light.rays.0 as u32,
-            height: light.rays.1 as u32,
-            bounces: light.bounces,
-            seed: light.seed,
-            ..TraceSettings::default()
-        },
-        placement: placed_by(placement),
-        phase: match placement.phase {
-            PhaseArg::Zero => Phase::Zero,
-            PhaseArg::Random => Phase::Random { seed: light.seed },
-            PhaseArg::Path => Phase::Path,
-        },
-        exposure: match placement.white.unwrap_or(default_white) {
-            White::Auto => Exposure::Auto,
-            White::None => Exposure::Full,
-            White::At(value) => Exposure::White(value),
-        },
-    }
-}
-
-/// Flags count distances behind the panel; the library's z is negative there.
-fn placed_by(args: &PlacementArgs) -> Placement {
-    match args.placement {
-        PlacementArg::Window => Placement::Window { eye: args.viewer, near: -args.near, far: -args.far },
-        PlacementArg::Model => Placement::Model { eye: args.viewer, z: -args.distance, scale: args.scale },
-    }
-}
-
-pub(super) fn hologram_settings(args: &HologramArgs, engine: Option<EngineArg>) -> HologramSettings {
-    HologramSettings {
-        error: args.error,
-        method: engine.map(|engine| match engine {
-            EngineArg::Oracle => Method::Oracle,
-            EngineArg::Direct => Method::Direct,
-            EngineArg::Tiles => Method::Tiles,
-            EngineArg::Planes => Method::Planes,
-        }),
-        ..HologramSettings::default()
-    }
-}
-
-pub(super) fn channel(args: &HologramArgs) -> Channel {
-    match args.channel {
-        ChannelArg::Luminance => Channel::Luminance,
-        ChannelArg::Red => Channel::Red,
-        ChannelArg::Green => Channel::Green,
-        ChannelArg::Blue => Channel::Blue,
-    }
-}
-
-/// What kind of file an input is, by its name.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Input {
-    Scene(PathBuf),
-    Points(PathBuf),
-    Images(PathBuf, PathBuf),
-    Field(PathBuf),
-    Frame(PathBuf),
-}
-
-pub(super) fn input(path: &Path) -> Result<Input> {
-    let text = path.to_string_lossy();
-    let pictures = [".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"];
-    if !path.exists()
-        && let Some((rgb, depth)) = text.split_once('+')
-        && [rgb, depth].iter().all(|p| pictures.iter().any(|e| p.to_lowercase().ends_with(e)))
-    {
-        return Ok(Input::Images(rgb.into(), depth.into()));
-    }
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let found = match extension.as_str() {
-        "gltf" | "glb" => Input::Scene(path.into()),
-        "ply" => Input::Points(path.into()),
-        "npy" => Input::Field(path.into()),
-        "png" | "bmp" => Input::Frame(path.into()),
-        _ => {
-            let what =
-                "not a kind of file that is read here: .gltf, .glb, .ply, .npy, .png, .bmp, or rgb.png+depth.png";
-            return Err(Error::input(path, what));
-        }
-    };
-    // Found out before an output folder is made.
-    std::fs::File::open(path).map_err(Error::io(path))?;
-    Ok(found)
-}
-
-/// Points with what is known of them.
-pub(super) struct Points {
-    pub(super) cloud: PointCloud,
-    pub(super) metadata: ply::Metadata,
-    pub(super) lit: Option<Lit>,
-}
-
-/// Points of a scene, a cloud or a picture with depth.
-pub(super) fn load_points(
-    input: &Input,
-    (light, placement, default_white): (&SceneArgs, &PlacementArgs, White),
-    panel: &Panel,
-    progress: &Progress,
-    report: &mut Report,
-) -> Result<Points> {
-    let settings = scene_settings(light, placement, default_white);
-    let begin = Instant::now();
-    match input {
-        Input::Scene(path) => {
-            let lit = pipeline::light(path, &settings, &panel.grid, panel.wavelength, progress)?;
-            report_light(&lit, begin.elapsed().as_secs_f64(), report);
-            let placing = &lit.view.placing;
-            let metadata = ply::Metadata {
-                frame: ply::Frame::Hologram,
-                scene: path.display().to_string(),
-                eye: Some(placing.eye.to_array()),
-                window: Some(placing.window.to_array()),
-                rays: Some([lit.view.width, lit.view.height]),
-                phase: format!("{:?}", settings.phase),
-            };
-            Ok(Points { cloud: lit.placed.cloud.clone(), metadata, lit: Some(lit) })
-        }
-        Input::Points(path) => {
-            let read = ply::read(path)?;
-            report.warn(read.warnings.iter().map(|w| format!("{}: {w}", path.display())));
-            if read.metadata.as_ref().is_some_and(|m| m.frame == ply::Frame::World) {
-                let what = "its points stand in the scene's own metres; write them with --frame hologram";
-                return Err(Error::input(path, what));
-            }
-            if read.cloud.points.is_empty() {
-                return Err(Error::input(path, "has no points"));
-            }
-            if read.cloud.points.iter().all(|p| p.amplitude == 0.0) {
-                return Err(Error::input(path, "all its points are dark: no amplitude is above zero"));
-            }
-            report_cloud(&read.cloud, begin.elapsed().as_secs_f64(), report);
-            Ok(Points { cloud: read.cloud, metadata: read.metadata.unwrap_or_default(), lit: None })
-        }
-        Input::Images(rgb, depth) => {
-            let scale = match placement.depth_scale {
-                DepthArg::WhiteNear => images::DepthScale::WhiteNear,
-                DepthArg::BlackNear => images::DepthScale::BlackNear,
-            };
-            let seed = match settings.phase {
-                Phase::Zero => None,
-                Phase::Random { seed } => Some(seed),
-                Phase::Path => {
-                    return Err(Error::parameter("phase", "path is for scenes; use zero or random with a picture"));
-                }
-            };
-            let cloud = images::read(rgb, depth, scale, &settings.placement, seed, &panel.grid)?;
-            report_cloud(&cloud, begin.elapsed().as_secs_f64(), report);
-            let metadata = ply::Metadata { scene: rgb.display().to_string(), ..ply::Metadata::default() };
-            Ok(Points { cloud, metadata, lit: None })
-        }
-        Input::Field(path) | Input::Frame(path) => {
-            Err(Error::input(path, "is no scene, point cloud or picture with depth (rgb.png+depth.png)"))
-        }
-    }
-}
-
-fn report_cloud(cloud: &PointCloud, elapsed: f64, report: &mut Report) {
-    let depth = cloud.depth_range();
-    report.add("points", cloud.points.len(), "");
-    report.add_serialised("depth", &depth, "");
-    let range =
-        depth.map(|(far, near)| format!(", z {} … {}", show_length(far), show_length(near))).unwrap_or_default();
-    report.add(
-        "points_seconds",
-        elapsed,
-        format!("points       {:>8}  {} points{range}", seconds(elapsed), count(cloud.points.len())),
-    );
-}
-
-fn report_light(lit: &Lit, elapsed: f64, report: &mut Report) {
-    report.warn(lit.warnings.iter());
-    let (light, trace) = (&lit.illumination, &lit.trace);
-    let load = (elapsed - light.seconds - trace.seconds).max(0.0);
-    report.add("scene_seconds", load, format!("scene        {:>8}", seconds(load)));
-    let energy = &light.energy;
-    for (key, value) in
-        [("energy_emitted", energy.emitted), ("energy_absorbed", energy.absorbed), ("energy_escaped", energy.escaped)]
-    {
-        report.add(key, value.to_array().to_vec(), "");
-    }
-    report.add("light_residual", light.convergence.residual, "");
-    report.add(
-        "light_seconds",
-        light.seconds,
-        format!(
-            "light        {:>8}  {} patches, {} iterations to a residual of {:.1e}; energy in = absorbed + escaped within {:.2} %",
-            seconds(light.seconds),
-            count(light.patches),
-            light.convergence.iterations,
-            light.convergence.residual,
-            100.0 * light.energy.imbalance()
-        ),
-    );
-    report.add("patches", light.patches, "");
-    report.add("rays", trace.rays, "");
-    report.add(
-        "trace_seconds",
-        trace.seconds,
-        format!("rays         {:>8}  {} rays", seconds(trace.seconds), count(trace.rays as usize)),
-    );
-    report_cloud(&lit.placed.cloud, 0.0, report);
-    report.add_serialised("white", &lit.white, "");
-    report.add("clipped_light", lit.clipped_light, "");
-    if let Some(white) = lit.white.filter(|_| lit.clipped_light > 0.0) {
-        let clipped = 100.0 * lit.clipped_light;
-        report.add("", Value::Null, format!("exposure               white is {white:.3} W/(m² sr); {clipped:.0} % of the light is brighter and clipped (--white)"));
-    }
-    report.add("mirrored_points", trace.by_mirror, "");
-    report.add("beyond_cone", lit.placed.beyond_cone, "");
-    report.add("beyond_cone_light", lit.placed.beyond_cone_light, "");
-    if lit.placed.beyond_cone > 0 {
-        report.warn([format!(
-            "{} points ({:.1} % of the light) stand where the panel cannot send light to the eye; move the viewer back or use a finer pitch",
-            count(lit.placed.beyond_cone),
-            100.0 * lit.placed.beyond_cone_light
-        )]);
-    }
-}
 
 pub(super) fn points(args: &PointsArgs) -> Result<Report> {
     let mut report = Report::new("points");
@@ -325,16 +63,6 @@ pub(super) fn write_traced(path: &Path, lit: &Lit) -> Result<()> {
     } else {
         npy::write_picture(path, view.width, view.height, &view.picture)
     }
-}
-
-/// Luminance that pictures of a scene show as white.
-pub(super) fn white_of(lit: &Lit) -> f32 {
-    lit.white.unwrap_or_else(|| pipeline::white_level(&lit.view.picture))
-}
-
-pub(super) fn luminance_picture(lit: &Lit) -> Picture {
-    let values = lit.view.picture.iter().map(|rgb| Channel::Luminance.of(*rgb)).collect();
-    Picture { width: lit.view.width, height: lit.view.height, values }
 }
 
 pub(super) fn report_field(computed: &Computed, report: &mut Report) {

@@ -3,6 +3,7 @@
 mod args;
 mod bar;
 mod commands;
+mod load;
 mod monitors;
 mod report;
 #[cfg(feature = "display")]

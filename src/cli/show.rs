@@ -2,10 +2,8 @@
 
 use super::args::{ShowArgs, White};
 use super::bar::Bar;
-use super::commands::{
-    self, Input, Panel, Points, channel, content, encode_field, hologram_settings, load_points, luminance_picture,
-    origin, report_field, seen_half, white_of, write_traced, write_view,
-};
+use super::commands::{content, encode_field, origin, report_field, seen_half, write_traced, write_view};
+use super::load::{self, Input, Panel, Points, channel, hologram_settings, load_points, luminance_picture, white_of};
 use super::report::{Report, count, seconds};
 use glam::DVec2;
 use holodrive::field::Field;
@@ -35,8 +33,8 @@ pub(super) fn show(args: &ShowArgs) -> Result<Report> {
 fn run(args: &ShowArgs) -> Result<Report> {
     let begin = Instant::now();
     let mut report = Report::new("show");
-    let source = commands::input(&args.input)?;
-    let panel = commands::panel(&args.panel, &mut report)?;
+    let source = load::input(&args.input)?;
+    let panel = load::panel(&args.panel, &mut report)?;
     let out = &args.output;
     #[cfg(not(feature = "display"))]
     if args.monitor.is_some() {

@@ -59,7 +59,7 @@ pub(super) fn gradient(
     progress: &Progress,
 ) -> Result<EncodedPattern> {
     let start =
-        DoublePhase { interlace: Interlace::Checkerboard, band: settings.band, percentile: Some(settings.percentile) };
+        DoublePhase { interlace: Interlace::Checkerboard, band: settings.band, percentile: settings.percentile };
     let made = double_phase::pattern(field, &start, progress)?;
     let aperture = band::of_share(field, settings.band)?;
     let target = Target::Complex { samples: made.target.samples.clone(), half: aperture.half };
