@@ -115,7 +115,7 @@ pub fn light(
     let aspect = f64::from(settings.trace.width) / f64::from(settings.trace.height);
     let placing = settings.placement.prepare(&loaded.scene, camera, aspect, panel)?;
     let bvh = SceneBvh::new(&loaded.scene);
-    let illumination = Illumination::new(&bvh, settings.illumination.clone(), progress)?;
+    let illumination = Illumination::new(&bvh, settings.illumination, progress)?;
     let traced = trace::trace(&illumination, &placing.camera, &settings.trace, progress)?;
     if traced.points.is_empty() {
         let what = if illumination.is_dark() {
@@ -141,7 +141,7 @@ pub fn light(
         placed,
         world,
         view,
-        illumination: illumination.report().clone(),
+        illumination: *illumination.report(),
         trace: traced.report,
         white,
         clipped_light,

@@ -21,15 +21,16 @@ fn references() -> Option<PathBuf> {
 }
 
 fn scene(name: &str) -> Option<Scene> {
-    Some(load(&references()?.join(name), &LoadOptions::default()).unwrap().scene)
+    Some(load(&references()?.join(name), &LoadOptions::default()).expect("reference data is whole").scene)
 }
 
 fn render(scene: &Scene, settings: IlluminationSettings) -> Traced {
     let bvh = SceneBvh::new(scene);
     let progress = Progress::new();
-    let light = Illumination::new(&bvh, settings, &progress).unwrap();
+    let light = Illumination::new(&bvh, settings, &progress).expect("reference data is whole");
     eprintln!("{:?}\nimbalance {:+.2e}", light.report(), light.report().energy.imbalance());
-    let traced = trace(&light, &scene.cameras[0], &TraceSettings::default(), &progress).unwrap();
+    let traced =
+        trace(&light, &scene.cameras[0], &TraceSettings::default(), &progress).expect("reference data is whole");
     eprintln!("{:?}", traced.report);
     traced
 }
@@ -98,7 +99,7 @@ fn inflate(bytes: &[u8]) -> Vec<u8> {
                 let count = lengths.iter().filter(|&&l| l == length).count() as i32;
                 if code - first < count {
                     let of_length = lengths.iter().enumerate().filter(|(_, l)| **l == length);
-                    return of_length.map(|(s, _)| s).nth((code - first) as usize).unwrap();
+                    return of_length.map(|(s, _)| s).nth((code - first) as usize).expect("reference data is whole");
                 }
                 first += count;
             }
@@ -128,7 +129,7 @@ fn inflate(bytes: &[u8]) -> Vec<u8> {
                 let mut lengths = Vec::new();
                 while lengths.len() < n + m {
                     let (value, repeat) = match bits.symbol(&code_lengths) {
-                        16 => (*lengths.last().unwrap(), 3 + bits.take(2)),
+                        16 => (*lengths.last().expect("reference data is whole"), 3 + bits.take(2)),
                         17 => (0, 3 + bits.take(3)),
                         18 => (0, 11 + bits.take(7)),
                         length => (length as u8, 1),
@@ -196,10 +197,10 @@ fn score(picture: &[[f32; 3]], reference: &[f32], leave_out: &[bool], region: &d
 #[test]
 fn cornell_room_agrees_with_a_path_tracer() {
     let Some(scene) = scene("cornell_diffuse.gltf") else { return };
-    let folder = references().unwrap();
-    let reference = floats(&std::fs::read(folder.join("cornell_diffuse_full.npy")).unwrap());
-    let depth = floats(&std::fs::read(folder.join("cornell_diffuse_depth.npy")).unwrap());
-    let masks = masks(&std::fs::read(folder.join("cornell_diffuse_masks.npz")).unwrap());
+    let folder = references().expect("reference data is whole");
+    let reference = floats(&std::fs::read(folder.join("cornell_diffuse_full.npy")).expect("reference data is whole"));
+    let depth = floats(&std::fs::read(folder.join("cornell_diffuse_depth.npy")).expect("reference data is whole"));
+    let masks = masks(&std::fs::read(folder.join("cornell_diffuse_masks.npz")).expect("reference data is whole"));
     let traced = render(&scene, IlluminationSettings::default());
 
     let (edge, lamp) = (&masks["edge"], &masks["light"]);

@@ -207,7 +207,7 @@ mod tests {
         assert!(w.at(w.limit) < 1.1e-4 && 1.0 - w.at(-0.7 * w.limit) < 1.1e-4);
         // On the axis, inside the flat part, the far form is the bare sphere.
         let u = optics.far(0.0, 0.0, 0.25);
-        assert!((u * 0.25 - Complex64::cis((0.25 / 633e-9 as f64).fract() * 2.0 * PI)).norm() < 1e-6);
+        assert!((u * 0.25 - Complex64::cis((0.25 / 633e-9_f64).fract() * 2.0 * PI)).norm() < 1e-6);
         assert!(Optics::new(&grid, 0.0).is_err() && Optics::new(&grid, f64::NAN).is_err());
     }
 }

@@ -46,18 +46,12 @@ impl View {
 }
 
 /// How a field is looked at, beside the view.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ViewSettings {
     /// Stop in the Fourier plane of a relay after the panel: keeps the conjugate orders of an encoding out.
     pub aperture: Option<Aperture>,
     /// Propagation settings (memory budget).
     pub propagation: Settings,
-}
-
-impl Default for ViewSettings {
-    fn default() -> Self {
-        Self { aperture: None, propagation: Settings::default() }
-    }
 }
 
 impl ViewSettings {
@@ -179,7 +173,7 @@ pub fn all_in_focus(
     if !(near.is_finite() && far.is_finite()) {
         return Err(Error::parameter("depths", "no pixel has a depth"));
     }
-    if !(step > 0.0) {
+    if step.is_nan() || step <= 0.0 {
         return Err(Error::parameter("step", format!("{step} m must be greater than zero")));
     }
     let planes = ((near - far) / step).ceil().max(1.0) as usize;

@@ -168,16 +168,15 @@ fn reach(optics: &Optics, axis: usize, distance: f64) -> f64 {
 /// The periodic grid: large enough that no point's light comes round onto the panel.
 fn layout(optics: &Optics, grid: &Grid, sources: &[Source], parameters: &Parameters) -> Layout {
     let h = parameters.half_depth(optics, depths(sources));
-    let pixels = [grid.width, grid.height];
     let mut layout = Layout { size: [0; 2], painted: 0, origin: [0; 2] };
-    for axis in 0..2 {
+    for (axis, pixels) in [grid.width as f64, grid.height as f64].into_iter().enumerate() {
         let halo = Table::half_width(optics, axis, h, parameters.tail) as f64 + 18.0;
-        let (mut low, mut high, mut size) = (f64::INFINITY, f64::NEG_INFINITY, pixels[axis] as f64);
+        let (mut low, mut high, mut size) = (f64::INFINITY, f64::NEG_INFINITY, pixels);
         for s in sources {
             let at = if axis == 0 { grid.column(s.x) } else { grid.row(s.y) };
             (low, high) = (low.min(at), high.max(at));
             // An alias, one period away, must lie beyond the point's reach from the farthest pixel.
-            let farthest = at.abs().max((pixels[axis] as f64 - 1.0 - at).abs());
+            let farthest = at.abs().max((pixels - 1.0 - at).abs());
             size = size.max(farthest + reach(optics, axis, s.distance) / optics.pitch[axis] + parameters.tail);
         }
         let painted = high - low + 2.0 * halo + 2.0;
@@ -258,7 +257,7 @@ pub(crate) fn add(
             plane.par_chunks_mut(1 << 16).for_each(|part| part.fill(Complex32::default()));
             moments.push(plane);
         }
-        let mut canvas = Canvas { width: layout.size[0], height: layout.painted, moments: &mut moments };
+        let mut canvas = Canvas { width: layout.size[0], moments: &mut moments };
         if !paint(&mut canvas, &brush, dabs, set, progress) {
             progress.check()?;
         }

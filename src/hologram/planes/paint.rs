@@ -48,11 +48,10 @@ pub(super) struct Brush<'a> {
     pub(super) depth: f64,
 }
 
-/// The moments of one plane; `width` columns, `height` rows each.
+/// The moments of one plane, rows of `width` samples each.
 #[derive(Debug)]
 pub(super) struct Canvas<'a> {
     pub(super) width: usize,
-    pub(super) height: usize,
     pub(super) moments: &'a mut [Vec<Complex32>],
 }
 
@@ -136,11 +135,11 @@ fn paint_bin(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32], set: I
     let mut span = [[usize::MAX, 0]; 2];
     for &i in bin {
         let dab = &dabs[i as usize];
-        for axis in 0..2 {
+        for (axis, span) in span.iter_mut().enumerate() {
             let reach = reach(brush, axis, dab.d);
             let first = (dab.at[axis] - reach).max(0.0) as usize;
             let last = (dab.at[axis] + reach) as usize + 2;
-            span[axis] = [span[axis][0].min(first), span[axis][1].max(last)];
+            *span = [span[0].min(first), span[1].max(last)];
         }
     }
     patch.first = [span[0][0], span[1][0]];
