@@ -171,18 +171,20 @@ fn each_letter_of_the_depth_chart_is_upright_and_sharp_at_its_own_depth_only() {
         let wanted = quarter(&target, 300, cell);
         let own = quarter(&seen[cell].values, 300, cell);
         let likeness = correlation(&own, &wanted);
-        // Speckle of full contrast on a letter that fills about half of its quarter leaves a correlation near 0.6.
-        assert!(likeness > 0.5, "letter {cell}: {likeness}");
+        // What is missing to 1 is speckle, and the light of the other letters.
+        assert!(likeness > 0.85, "letter {cell}: {likeness}");
         for (other, picture) in seen.iter().enumerate().filter(|(other, _)| *other != cell) {
             let blurred = correlation(&quarter(&picture.values, 300, cell), &wanted);
-            assert!(blurred < 0.85 * likeness, "letter {cell} at the depth of {other}: {blurred}, own {likeness}");
+            println!("letter {cell} at the depth of letter {other}: {blurred:.3}, at its own {likeness:.3}");
+            assert!(blurred < 0.9 * likeness, "letter {cell} at the depth of {other}: {blurred}, own {likeness}");
         }
         let mirrored: Vec<Vec<f32>> = own.iter().map(|row| row.iter().rev().copied().collect()).collect();
         let flipped: Vec<Vec<f32>> = own.iter().rev().cloned().collect();
         let turned: Vec<Vec<f32>> = mirrored.iter().rev().cloned().collect();
         for (name, wrong) in [("mirrored", mirrored), ("flipped", flipped), ("turned", turned)] {
             let alike = correlation(&wrong, &wanted);
-            assert!(alike < 0.8 * likeness, "letter {cell} {name}: {alike}, upright {likeness}");
+            // The letters themselves are as much as 0.82 like their images turned over (the G, mirrored).
+            assert!(alike < 0.9 * likeness, "letter {cell} {name}: {alike}, upright {likeness}");
         }
         println!("letter {cell} at z = {:.1} mm: correlation {likeness:.3}", depths[cell] * 1e3);
     }
