@@ -225,6 +225,13 @@ impl<'s> Elements<'s> {
         }
     }
 
+    /// At most `most` vertices spread over the mesh: where rays of theirs start, and their normals.
+    pub(crate) fn some_places(&self, most: usize, offset: f64) -> Vec<(DVec3, DVec3)> {
+        let step = self.vertices.len().div_ceil(most).max(1);
+        let chosen = self.vertices.iter().step_by(step).filter(|v| !v.buried);
+        chosen.map(|v| (v.origin(offset), v.normal)).collect()
+    }
+
     /// Mean over a sender of what is known at vertices; vertices inside bodies do not count.
     pub(crate) fn mean_over(&self, sender: Sender, x: &[Vec3]) -> Vec3 {
         let corners = self.elements[sender.element as usize].corners;

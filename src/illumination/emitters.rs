@@ -5,6 +5,7 @@
 //! noise outside of penumbrae, and none of a patch's shape inside.
 
 use super::form_factor::{FormFactor, point_to_element, point_to_polygon};
+use super::paths::Optics;
 use super::sampling::triangle_weights;
 use super::surface::Surface;
 use crate::random::Random;
@@ -127,6 +128,34 @@ impl Emitter {
         self.normal
     }
 
+    /// Corners in order [m].
+    pub(crate) fn corners(&self) -> &[DVec3] {
+        &self.corners
+    }
+
+    /// Area of one side [m²].
+    pub(crate) fn area(&self) -> f64 {
+        self.area
+    }
+
+    /// Radiance, averaged over the polygon.
+    pub(crate) fn mean_radiance(&self) -> Vec3 {
+        self.radiance
+    }
+
+    /// Radiance at a point of the polygon.
+    pub(crate) fn radiance_at(&self, scene: &Scene, position: DVec3) -> Vec3 {
+        if self.textured.is_none() {
+            return self.radiance;
+        }
+        let (origin, last) = (self.corners[0], self.corners[self.corners.len() - 1]);
+        let (u, v, p) = (self.corners[1] - origin, last - origin, position - origin);
+        let cross = u.cross(v);
+        let weights =
+            [p.cross(v).dot(cross), u.cross(p).dot(cross)].map(|w| (w / cross.length_squared()).clamp(0.0, 1.0));
+        self.radiance(scene, weights, position)
+    }
+
     pub(crate) fn is_two_sided(&self) -> bool {
         self.two_sided
     }
@@ -204,12 +233,13 @@ impl Emitters {
     pub(crate) fn light(
         &self,
         bvh: &SceneBvh,
+        optics: &Optics,
         point: DVec3,
         normal: DVec3,
         rays: ShadowRays,
         random: &mut Random,
     ) -> Vec3 {
-        let (lamps, points) = self.light_apart(bvh, point, normal, rays, random);
+        let (lamps, points) = self.light_apart(bvh, optics, point, normal, rays, random);
         lamps + points
     }
 
@@ -217,6 +247,7 @@ impl Emitters {
     pub(crate) fn light_apart(
         &self,
         bvh: &SceneBvh,
+        optics: &Optics,
         point: DVec3,
         normal: DVec3,
         rays: ShadowRays,
@@ -243,15 +274,20 @@ impl Emitters {
             let side = (f64::from(rays.first) * share).sqrt().ceil().max(1.0) as u32;
             let mut tally = Tally::default();
             let pieces = emitter.pieces(point, normal, factor);
-            tally.cast(bvh, emitter, &pieces, point, normal, side, random);
+            tally.cast((bvh, optics), emitter, &pieces, point, normal, side, random);
             if tally.is_mixed() && rays.penumbra > 0 {
                 let side = (f64::from(rays.penumbra) * share).sqrt().ceil() as u32;
-                tally.cast(bvh, emitter, &pieces, point, normal, side, random);
+                tally.cast((bvh, optics), emitter, &pieces, point, normal, side, random);
             }
             sum += tally.mean() * factor as f32;
         }
-        let points = self.punctual.iter().map(|light| punctual(bvh, light, point, normal)).sum();
+        let points = self.punctual.iter().map(|light| punctual(bvh, optics, light, point, normal)).sum();
         (sum * self.form_factor.scale() as f32, points)
+    }
+
+    /// The factor by which a transfer differs from Lambert's.
+    pub(crate) fn scale(&self) -> f32 {
+        self.form_factor.scale() as f32
     }
 
     /// Flux of the sampled polygons [W]; punctual lights are counted where they arrive.
@@ -276,7 +312,7 @@ impl Tally {
     #[allow(clippy::too_many_arguments)]
     fn cast(
         &mut self,
-        bvh: &SceneBvh,
+        around: (&SceneBvh, &Optics),
         emitter: &Emitter,
         pieces: &[Piece],
         point: DVec3,
@@ -304,23 +340,32 @@ impl Tally {
             }
             let (at, weights) = emitter.within(&pieces[piece], u, v);
             if pieces.len() > 1 {
-                self.shoot(bvh, emitter, point, at, weights, 1.0);
+                self.shoot(around, emitter, point, at, weights, 1.0);
                 continue;
             }
             let lit_side = if (point - at).dot(emitter.normal) >= 0.0 { emitter.normal } else { -emitter.normal };
             let weight = point_to_element(point, normal, at, lit_side, 1.0);
             if weight > 0.0 {
-                self.shoot(bvh, emitter, point, at, weights, weight);
+                self.shoot(around, emitter, point, at, weights, weight);
             }
         }
     }
 
-    fn shoot(&mut self, bvh: &SceneBvh, emitter: &Emitter, point: DVec3, at: DVec3, weights: [f64; 2], weight: f64) {
+    fn shoot(
+        &mut self,
+        (bvh, optics): (&SceneBvh, &Optics),
+        emitter: &Emitter,
+        point: DVec3,
+        at: DVec3,
+        weights: [f64; 2],
+        weight: f64,
+    ) {
         let lift = emitter.normal * bvh.offset().copysign((point - at).dot(emitter.normal));
         self.weight += weight;
-        if !bvh.occluded(point, at + lift) {
+        let left = optics.transmittance(bvh, point, at + lift);
+        if left.max_element() > 0.0 {
             self.clear += weight;
-            self.light += emitter.radiance(bvh.scene(), weights, at) * weight as f32;
+            self.light += left * emitter.radiance(bvh.scene(), weights, at) * weight as f32;
         }
     }
 
@@ -334,7 +379,21 @@ impl Tally {
     }
 }
 
-fn punctual(bvh: &SceneBvh, light: &PunctualLight, point: DVec3, normal: DVec3) -> Vec3 {
+fn punctual(bvh: &SceneBvh, optics: &Optics, light: &PunctualLight, point: DVec3, normal: DVec3) -> Vec3 {
+    match punctual_light(bvh, light, point, normal) {
+        Some((strength, end)) => strength * optics.transmittance(bvh, point, end),
+        None => Vec3::ZERO,
+    }
+}
+
+/// Irradiance over π that a punctual light would give if nothing stood in the way, and where its light comes from [m]: a
+/// point beyond the scene for a directional one. `None` where it gives none.
+pub(crate) fn punctual_light(
+    bvh: &SceneBvh,
+    light: &PunctualLight,
+    point: DVec3,
+    normal: DVec3,
+) -> Option<(Vec3, DVec3)> {
     let (towards, distance, strength) = match light.kind {
         LightKind::Directional => (-light.direction.as_dvec3(), f64::INFINITY, 1.0),
         LightKind::Point | LightKind::Spot { .. } => {
@@ -357,7 +416,7 @@ fn punctual(bvh: &SceneBvh, light: &PunctualLight, point: DVec3, normal: DVec3) 
     };
     let cosine = normal.dot(towards);
     if !(cosine > 0.0 && strength > 0.0 && strength.is_finite()) {
-        return Vec3::ZERO;
+        return None;
     }
     let end = if distance.is_finite() {
         light.position.as_dvec3()
@@ -365,7 +424,7 @@ fn punctual(bvh: &SceneBvh, light: &PunctualLight, point: DVec3, normal: DVec3) 
         let size = bvh.scene().bounds().map_or(0.0, |(low, high)| (high - low).length());
         point + towards * (2.0 * size)
     };
-    if bvh.occluded(point, end) { Vec3::ZERO } else { light.intensity * (strength * cosine * FRAC_1_PI) as f32 }
+    Some((light.intensity * (strength * cosine * FRAC_1_PI) as f32, end))
 }
 
 /// What all surfaces would show, in the sum of the colours, if the emitters' light were spread evenly over a closed room

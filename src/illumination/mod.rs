@@ -1,19 +1,29 @@
 //! Light on surfaces: what leaves each point of a scene towards an eye.
 //!
 //! Three parts, by the way that light came:
-//! - *straight from a lamp*: at each point that is asked for, by exact polygonal form factors and shadow rays
-//!   (the private module `emitters`): shadows have no patch edges;
+//! - *straight from a lamp*, also through thin walls: at each point that is asked for, by exact polygonal form factors
+//!   and shadow rays (the private module `emitters`): shadows have no patch edges;
+//! - *from a lamp by way of optics*: flat mirrors show images of the lamp (`images`), all else is done by photons
+//!   (`photons`, spread by `caustics`);
 //! - *from other surfaces*: radiosity on an adaptive mesh (`elements`, `radiosity`), linear over each element; where
 //!   something cuts through an element the point gathers for itself, so that nothing leaks through a wall;
-//! - *by way of mirrors and glass*: rays that gather follow them (`paths`).
+//!   Rays that gather follow mirrors and glass (`paths`).
 //!
 //! Radiance of a Lambertian surface is ρE/π; "irradiance" in this module's tables is E/π, so that a white surface shows
 //! it unchanged.
 
+#[cfg(test)]
+mod caustic_tests;
+mod caustics;
 mod elements;
 mod emitters;
+mod flat_mirrors;
 pub mod form_factor;
+mod images;
+pub mod oracle;
+mod patches;
 pub mod paths;
+mod photons;
 mod radiosity;
 #[cfg(test)]
 pub(crate) mod rooms;
@@ -30,12 +40,16 @@ use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::random::Random;
 use crate::scene::bvh::{Hit, Ray, SceneBvh};
+use caustics::Caustics;
 use elements::{Elements, Fineness, Senders};
 use emitters::{Emitters, ShadowRays};
 use glam::{DVec3, Vec3};
-use paths::Mirrors;
+use images::{Around, Images};
+use patches::Patches;
+use paths::Optics;
 use radiosity::{End, Surroundings, Transport};
 use rayon::prelude::*;
+#[cfg(test)]
 use std::f64::consts::PI;
 use std::time::Instant;
 
@@ -64,6 +78,8 @@ pub struct IlluminationSettings {
     pub final_gather: Option<u32>,
     /// Most mirrors or glass surfaces that light follows one after another.
     pub bounces: u32,
+    /// Photons that lamps send through curved mirrors, glass and rough metal; none are sent where there is none of it.
+    pub photons: u32,
     /// Seed of all sampling.
     pub seed: u64,
 }
@@ -81,7 +97,8 @@ impl Default for IlluminationSettings {
             nearness: 0.5,
             most_vertices: 60_000,
             final_gather: None,
-            bounces: 8,
+            bounces: 32,
+            photons: 400_000,
             seed: 1,
         }
     }
@@ -118,6 +135,10 @@ pub struct IlluminationReport {
     pub vertices: usize,
     /// Rays that gathered indirect light.
     pub gathering_rays: u64,
+    /// Images of lamps in flat mirrors.
+    pub lamp_images: usize,
+    /// Photons that arrived on diffuse surfaces by way of other optics.
+    pub photons: usize,
     /// How the solver ended.
     pub convergence: Convergence,
     /// Where the light went.
@@ -128,6 +149,8 @@ pub struct IlluminationReport {
 
 /// Most gathering rays in all, so that their table stays below 100 MB.
 const MOST_GATHERING_RAYS: usize = 24_000_000;
+/// Vertices at which images of lamps are compared.
+const MOST_PLACES: usize = 400;
 /// Rays with which a point gathers where its element is cut through.
 const DOUBT_SIDE: usize = 16;
 
@@ -137,22 +160,15 @@ pub struct Illumination<'s> {
     settings: IlluminationSettings,
     emitters: Emitters,
     mesh: Elements<'s>,
-    mirrors: Mirrors,
+    optics: Optics,
+    images: Images,
+    caustics: Caustics,
     senders: Senders,
     /// Radiance that leaves each sender, without sampled emission.
     leaving: Vec<Vec3>,
-    /// Indirect irradiance over π at the vertices.
+    /// Indirect irradiance over π at the vertices, with that of weak images of lamps.
     irradiance: Vec<Vec3>,
     report: IlluminationReport,
-}
-
-/// Per sender: what it does to light and what it gets.
-struct Patches {
-    area: Vec<f32>,
-    albedo: Vec<Vec3>,
-    emission: Vec<Vec3>,
-    direct: Vec<Vec3>,
-    punctual: Vec<Vec3>,
 }
 
 impl<'s> Illumination<'s> {
@@ -165,7 +181,8 @@ impl<'s> Illumination<'s> {
         let begin = Instant::now();
         let scene = bvh.scene();
         let emitters = Emitters::new(scene, settings.form_factor);
-        let mirrors = Mirrors::new(scene, settings.bounces);
+        let lamps = emitters.polygons.len() + scene.lights.len();
+        let optics = Optics::new(scene, settings.bounces, Images::most_mirrors(lamps));
         let diagonal = scene.bounds().map_or(0.0, |(low, high)| (high - low).length());
         let fineness = Fineness {
             longest: settings.longest_element * diagonal,
@@ -181,11 +198,21 @@ impl<'s> Illumination<'s> {
         });
         let senders = mesh.senders();
         progress.check()?;
-        let patches = Patches::new(bvh, &mesh, &senders, &emitters, &settings, progress)?;
+        let around = Around { bvh, optics: &optics, emitters: &emitters };
+        let images = Images::new(around, &mesh.some_places(MOST_PLACES, bvh.offset()));
+        let weak = weak_light(around, &images, &mesh, settings.seed ^ 0x3ea7, progress)?;
+        let mut patches = Patches::new(around, &images, &mesh, &senders, &settings, progress)?;
+        for (direct, &sender) in patches.direct.iter_mut().zip(&senders.all) {
+            *direct += mesh.mean_over(sender, &weak);
+        }
+        let photons = photons::shoot(around, settings.photons, settings.seed ^ 0xf070, progress)?;
+        patches.receive(bvh, &mesh, &senders, &photons);
+        let caustics = Caustics::new(bvh, &photons);
+        progress.check()?;
         let most = (MOST_GATHERING_RAYS / mesh.vertices.len().max(1)) as f64;
         let side = f64::from(settings.indirect_rays).min(most).sqrt().floor().max(4.0) as usize;
-        let around = Surroundings { bvh, mesh: &mesh, senders: &senders, mirrors: &mirrors };
-        let transport = Transport::cast(&around, side, settings.seed ^ 0x6a7, progress)?;
+        let surroundings = Surroundings { bvh, mesh: &mesh, senders: &senders, optics: &optics };
+        let transport = Transport::cast(&surroundings, side, settings.seed ^ 0x6a7, progress)?;
         let scale = settings.form_factor.scale() as f32;
         let source: Vec<Vec3> =
             (0..senders.all.len()).map(|s| patches.albedo[s] * patches.direct[s] + patches.emission[s]).collect();
@@ -197,12 +224,16 @@ impl<'s> Illumination<'s> {
             radiosity::solve(&source, bounce, |b| transport.gather(b, scale), settings.residual, 200, progress)?;
         let reflected = bounce(&irradiance);
         let leaving: Vec<Vec3> = source.iter().zip(&reflected).map(|(s, r)| *s + *r).collect();
+        let energy = patches.energy(&surroundings, &emitters, &transport, &leaving, &irradiance, settings.seed);
+        let irradiance = irradiance.iter().zip(&weak).map(|(i, w)| *i + *w).collect();
         let mut light = Self {
             bvh,
             settings,
             emitters,
             mesh,
-            mirrors,
+            optics,
+            images,
+            caustics,
             senders,
             leaving,
             irradiance,
@@ -214,7 +245,9 @@ impl<'s> Illumination<'s> {
             vertices: light.mesh.vertices.len(),
             gathering_rays: (light.mesh.vertices.len() * side * side) as u64,
             convergence,
-            energy: light.energy(&patches, &transport),
+            lamp_images: light.images.len(),
+            photons: photons.len(),
+            energy,
             seconds: begin.elapsed().as_secs_f64(),
         };
         Ok(light)
@@ -243,17 +276,22 @@ impl<'s> Illumination<'s> {
         surface.emission + surface.albedo * (self.direct(surface, random) + self.indirect(hit, surface, random))
     }
 
-    /// Irradiance over π that comes straight from lamps.
+    /// Irradiance over π that comes from lamps, straight or by way of mirrors and glass.
     pub fn direct(&self, surface: &Surface, random: &mut Random) -> Vec3 {
         let point = surface.position + surface.facing * self.bvh.offset();
         let rays = ShadowRays { first: self.settings.shadow_rays, penumbra: self.settings.penumbra_rays };
-        self.emitters.light(self.bvh, point, surface.normal, rays, random)
+        let straight = self.emitters.light(self.bvh, &self.optics, point, surface.normal, rays, random);
+        let rays = ShadowRays { first: rays.first.div_ceil(2), penumbra: rays.penumbra / 2 };
+        let mirrored = self.images.strong(self.around(), point, surface.normal, rays, random);
+        straight + mirrored + self.caustics.light(surface.position, surface.facing)
     }
 
     /// Irradiance over π that comes by way of other surfaces.
     pub fn indirect(&self, hit: &Hit, surface: &Surface, random: &mut Random) -> Vec3 {
         if let Some(rays) = self.settings.final_gather {
-            return self.gather(surface, f64::from(rays).sqrt().ceil() as usize, random);
+            let point = surface.position + surface.facing * self.bvh.offset();
+            let images = self.images.weak(self.around(), point, surface.normal, random);
+            return images + self.gather(surface, f64::from(rays).sqrt().ceil() as usize, random);
         }
         let barycentric = hit.barycentric.map(|b| b as f32);
         let Some((element, weights)) = self.mesh.locate(hit.triangle, hit.front, barycentric) else {
@@ -261,7 +299,9 @@ impl<'s> Illumination<'s> {
         };
         let element = &self.mesh.elements[element as usize];
         if element.doubtful {
-            return self.gather(surface, DOUBT_SIDE, random);
+            let point = surface.position + surface.facing * self.bvh.offset();
+            let images = self.images.weak(self.around(), point, surface.normal, random);
+            return images + self.gather(surface, DOUBT_SIDE, random);
         }
         element.corners.iter().zip(weights).map(|(&v, w)| self.irradiance[v as usize] * w).sum()
     }
@@ -277,7 +317,7 @@ impl<'s> Illumination<'s> {
         for direction in directions {
             if direction.dot(surface.facing) > 0.0 {
                 rays += 1.0;
-                if let End::Sender(sender, weight) = around.follow(Ray { origin, direction }, random) {
+                if let (End::Sender(sender), weight) = around.follow(Ray { origin, direction }, random) {
                     sum += self.leaving[sender as usize] * weight;
                 }
             }
@@ -286,54 +326,26 @@ impl<'s> Illumination<'s> {
     }
 
     fn surroundings(&self) -> Surroundings<'_> {
-        Surroundings { bvh: self.bvh, mesh: &self.mesh, senders: &self.senders, mirrors: &self.mirrors }
+        Surroundings { bvh: self.bvh, mesh: &self.mesh, senders: &self.senders, optics: &self.optics }
     }
 
-    fn energy(&self, patches: &Patches, transport: &Transport) -> Energy {
-        let mut sums = [[0.0f64; 3]; 3];
-        let mut add = |which: usize, flux: Vec3| {
-            for (sum, part) in sums[which].iter_mut().zip(flux.to_array()) {
-                *sum += f64::from(part);
-            }
-        };
-        add(0, self.emitters.flux());
-        for (s, &sender) in self.senders.all.iter().enumerate() {
-            let flux = (f64::from(patches.area[s]) * PI) as f32;
-            let arriving = patches.direct[s] + self.mesh.mean_over(sender, &self.irradiance);
-            add(0, (patches.emission[s] + patches.punctual[s]) * flux);
-            add(1, (Vec3::ONE - patches.albedo[s]) * arriving * flux);
-            let corners = self.mesh.elements[sender.element as usize].corners;
-            let chosen = sender.corner.map_or(&corners[..], |k| &corners[k as usize..=k as usize]);
-            let n = chosen.len() as f32;
-            let losses = chosen.iter().map(|&v| transport.losses(v as usize));
-            let (escaped, black) = losses.fold((0.0, 0.0), |sum, l| (sum.0 + l.0 / n, sum.1 + l.1 / n));
-            add(2, self.leaving[s] * flux * escaped);
-            add(1, self.leaving[s] * flux * black);
-        }
-        for (index, emitter) in self.emitters.polygons.iter().enumerate() {
-            let side = 64u32;
-            let mut random = Random::new(self.settings.seed ^ 0xe4e, index as u64);
-            let (mut escaped, mut black) = (0.0f32, 0.0f32);
-            for cell in 0..side * side {
-                let (point, _) = emitter.point(random.uniform(), random.uniform());
-                let up = !emitter.is_two_sided() || cell % 2 == 0;
-                let normal = if up { emitter.normal() } else { -emitter.normal() };
-                let direction = sampling::hemisphere(normal, 1, &mut random).next().unwrap_or(normal);
-                random = Random::new(random.bits(), u64::from(cell));
-                let ray = Ray { origin: point + normal * self.bvh.offset(), direction };
-                match self.surroundings().follow(ray, &mut random) {
-                    End::Escaped => escaped += 1.0,
-                    End::Black => black += 1.0,
-                    End::Sender(..) => {}
-                }
-            }
-            let flux = emitter.flux() / (side * side) as f32;
-            add(2, flux * escaped);
-            add(1, flux * black);
-        }
-        let colour = |s: [f64; 3]| Vec3::new(s[0] as f32, s[1] as f32, s[2] as f32);
-        Energy { emitted: colour(sums[0]), absorbed: colour(sums[1]), escaped: colour(sums[2]) }
+    fn around(&self) -> Around<'_> {
+        Around { bvh: self.bvh, optics: &self.optics, emitters: &self.emitters }
     }
+}
+
+/// Light of weak images at the vertices: irradiance over π.
+fn weak_light(around: Around, images: &Images, mesh: &Elements, seed: u64, progress: &Progress) -> Result<Vec<Vec3>> {
+    let offset = around.bvh.offset();
+    let found = mesh.vertices.par_iter().enumerate().map(|(index, vertex)| {
+        if vertex.buried || progress.stopped() {
+            return Vec3::ZERO;
+        }
+        images.weak(around, vertex.origin(offset), vertex.normal, &mut Random::new(seed, index as u64))
+    });
+    let found = found.collect();
+    progress.check()?;
+    Ok(found)
 }
 
 fn may_scatter(material: &crate::scene::Material) -> bool {
@@ -341,60 +353,6 @@ fn may_scatter(material: &crate::scene::Material) -> bool {
         && material.roughness < surface::WIDE_LOBE
         && material.metallic_roughness_texture.is_none();
     material.base_color.max_element() > 0.0 && !metal && material.transmission < 1.0
-}
-
-impl Patches {
-    fn new(
-        bvh: &SceneBvh,
-        mesh: &Elements,
-        senders: &Senders,
-        emitters: &Emitters,
-        settings: &IlluminationSettings,
-        progress: &Progress,
-    ) -> Result<Self> {
-        progress.start("direct light on patches", senders.all.len() as u64);
-        let found: Vec<[Vec3; 5]> = senders
-            .all
-            .par_iter()
-            .enumerate()
-            .map(|(number, &sender)| {
-                progress.advance(1);
-                let element = &mesh.elements[sender.element as usize];
-                let buried = sender.corner.is_some_and(|k| mesh.vertices[element.corners[k as usize] as usize].buried);
-                let mut sums = [Vec3::ZERO; 5];
-                if buried || progress.stopped() {
-                    return sums;
-                }
-                // A share of the rays of a picture's point at each place: the mean over the patch is what counts.
-                let places = mesh.places(sender);
-                let share = places.len() as u32;
-                let rays = ShadowRays { first: settings.shadow_rays.div_ceil(share), penumbra: 0 };
-                let area = mesh.area(sender.element) / if sender.corner.is_some() { 3.0 } else { 1.0 };
-                let mut random = Random::new(settings.seed ^ 0x1ea, number as u64);
-                for &barycentric in &places {
-                    let position = bvh.scene().triangles[element.triangle as usize].at(barycentric);
-                    let hit =
-                        Hit { triangle: element.triangle, distance: 0.0, position, barycentric, front: element.front };
-                    let surface = Surface::at(bvh.scene(), &hit, (area / places.len() as f64).sqrt());
-                    let point = position + surface.facing * bvh.offset();
-                    let (lamps, points) = emitters.light_apart(bvh, point, surface.normal, rays, &mut random);
-                    sums[0] += surface.albedo;
-                    sums[1] += lamps + points;
-                    sums[2] += points;
-                    if !emitters.sampled[element.triangle as usize] {
-                        sums[3] += surface.emission;
-                    }
-                }
-                sums = sums.map(|sum| sum / share as f32);
-                sums[4] = Vec3::splat(area as f32);
-                sums
-            })
-            .collect();
-        progress.check()?;
-        let column = |k: usize| found.iter().map(|f| f[k]).collect();
-        let area = found.iter().map(|f| f[4].x).collect();
-        Ok(Self { albedo: column(0), direct: column(1), punctual: column(2), emission: column(3), area })
-    }
 }
 
 impl IlluminationSettings {

@@ -1,9 +1,10 @@
 //! How a ray goes on at mirrors, glossy metals and glass.
 
+use super::flat_mirrors::FlatMirrors;
 use super::sampling::tangents;
 use super::surface::{MIRROR_ALPHA, Surface, WIDE_LOBE};
 use crate::random::Random;
-use crate::scene::bvh::{Meeting, Ray, SceneBvh};
+use crate::scene::bvh::{Meeting, Ray, SceneBvh, Sides};
 use crate::scene::{AlphaMode, Material, Scene};
 use glam::{DVec3, Vec3};
 
@@ -64,31 +65,95 @@ pub(crate) fn ggx_weight(view: f64, light: f64, alpha: f64) -> f64 {
     (1.0 + v) / (1.0 + v + l)
 }
 
+/// In which way a ray has left a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Way {
+    /// Reflected.
+    Mirrored,
+    /// Into or out of a body.
+    Refracted,
+    /// Through a thin wall or past a part that is not covered, its direction unchanged.
+    Straight,
+}
+
 /// How a ray goes on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Continuation {
     /// It ends on the surface's diffuse part, weighted to make up for the other ways it could have gone.
-    Diffuse(f32),
+    Diffuse(Vec3),
     /// It goes on along another ray, tinted.
-    Onward(Ray, Vec3),
+    Onward(Ray, Vec3, Way),
     /// It ends.
     Absorbed,
 }
 
 /// Which surfaces are more than diffuse.
 #[derive(Clone, Debug)]
-pub(crate) struct Mirrors {
+pub(crate) struct Optics {
     /// Per triangle: whether its material reflects, transmits or is passed in part.
     pub(crate) optical: Vec<bool>,
+    /// Per triangle: whether light passes it straight on, in part.
+    passes: Vec<bool>,
+    /// Whether any triangle is passed.
+    any_passes: bool,
+    /// Flat mirrors, in which lamps have images.
+    pub(crate) mirrors: FlatMirrors,
     /// Most surfaces on one path.
     pub(crate) bounces: u32,
 }
 
-impl Mirrors {
-    pub(crate) fn new(scene: &Scene, bounces: u32) -> Self {
-        let materials: Vec<bool> = scene.materials.iter().map(is_optical).collect();
-        let optical = scene.triangles.iter().map(|t| materials[t.material as usize]).collect();
-        Self { optical, bounces: bounces + 1 }
+impl Optics {
+    /// For paths over at most `bounces` surfaces, with at most `most_mirrors` flat mirrors set apart.
+    pub(crate) fn new(scene: &Scene, bounces: u32, most_mirrors: usize) -> Self {
+        let optical: Vec<bool> = scene.materials.iter().map(is_optical).collect();
+        let passes: Vec<bool> = scene.materials.iter().map(is_passed).collect();
+        let each = |of: &[bool]| -> Vec<bool> { scene.triangles.iter().map(|t| of[t.material as usize]).collect() };
+        let (optical, passes) = (each(&optical), each(&passes));
+        let mirrors = FlatMirrors::new(scene, most_mirrors);
+        Self { any_passes: passes.contains(&true), optical, passes, mirrors, bounces: bounces + 1 }
+    }
+
+    /// Whether anything in the scene bends light, or reflects it other than diffusely.
+    pub(crate) fn any_optical(&self) -> bool {
+        self.optical.contains(&true)
+    }
+
+    /// What thin walls and half-covered surfaces leave of light between two points that are lifted off their surfaces;
+    /// zero where something solid stands between.
+    pub(crate) fn transmittance(&self, bvh: &SceneBvh, from: DVec3, to: DVec3) -> Vec3 {
+        if !self.any_passes {
+            return if bvh.occluded(from, to) { Vec3::ZERO } else { Vec3::ONE };
+        }
+        let length = (to - from).length();
+        let ray = Ray { origin: from, direction: (to - from) / length };
+        match self.solid(bvh, ray, length) {
+            (None, tint) => tint,
+            (Some(_), _) => Vec3::ZERO,
+        }
+    }
+
+    /// The first surface along a ray before `length` [m] that is not passed straight on, with the ray that starts behind
+    /// the last passed one, and what the passed ones have left of the light.
+    pub(crate) fn solid(&self, bvh: &SceneBvh, ray: Ray, length: f64) -> (Option<(Meeting, Ray)>, Vec3) {
+        let (mut ray, mut left, mut tint) = (ray, length, Vec3::ONE);
+        for _ in 0..=self.bounces {
+            let Some(meeting) = bvh.meet(&ray, 0.0, left, Sides::Both) else { return (None, tint) };
+            if !self.passes[meeting.triangle as usize] {
+                return (Some((meeting, ray)), tint);
+            }
+            let hit = bvh.refined(&ray, &meeting);
+            let surface = Surface::at(bvh.scene(), &hit, 0.0);
+            tint *= surface.straight(ray.direction);
+            // Beyond the sheet, by as much as traversal may be off.
+            let slope = surface.facing.dot(ray.direction).abs().max(1e-3);
+            let step = hit.distance + bvh.offset() / slope;
+            left -= step;
+            if tint.max_element() <= 0.0 || left <= 0.0 {
+                break;
+            }
+            ray.origin = ray.at(step);
+        }
+        (None, if left <= 0.0 { tint } else { Vec3::ZERO })
     }
 
     /// Chooses one way on, with a probability in proportion to its strength.
@@ -102,7 +167,7 @@ impl Mirrors {
         let surface = Surface::at(scene, &hit, 0.0);
         if surface.coverage < 1.0 && random.uniform_f32() >= surface.coverage {
             let origin = surface.position - surface.facing * bvh.offset();
-            return Continuation::Onward(Ray { origin, direction: ray.direction }, Vec3::ONE);
+            return Continuation::Onward(Ray { origin, direction: ray.direction }, Vec3::ONE, Way::Straight);
         }
         let absorbed = inside(material, &hit, hit.distance);
         let ways = Ways::new(&surface, ray.direction, random);
@@ -114,13 +179,17 @@ impl Mirrors {
             return Continuation::Absorbed;
         }
         if pick < d {
-            return Continuation::Diffuse((total / d) as f32 * absorbed.max_element());
+            return Continuation::Diffuse(absorbed * (total / d) as f32);
         }
-        let (direction, weight, p) =
-            if pick < d + r { (ways.mirrored, ways.reflectance, r) } else { (ways.through, ways.transmittance, t) };
+        let onward = if surface.volume { Way::Refracted } else { Way::Straight };
+        let (direction, weight, p, way) = if pick < d + r {
+            (ways.mirrored, ways.reflectance, r, Way::Mirrored)
+        } else {
+            (ways.through, ways.transmittance, t, onward)
+        };
         let side = if direction.dot(surface.facing) > 0.0 { 1.0 } else { -1.0 };
         let origin = surface.position + surface.facing * (side * bvh.offset());
-        Continuation::Onward(Ray { origin, direction }, weight * absorbed * (total / p) as f32)
+        Continuation::Onward(Ray { origin, direction }, weight * absorbed * (total / p) as f32, way)
     }
 }
 
@@ -176,9 +245,7 @@ impl Ways {
                     ways.transmittance = tint * (1.0 - part);
                 }
             } else {
-                // A thin wall: both faces at once, with all the light that goes to and fro between them.
-                let one = dielectric_reflectance(cosine, 1.0 / surface.ior) as f32;
-                let both = 2.0 * one / (1.0 + one);
+                let both = surface.thin_wall_reflectance(cosine);
                 reflectance = Vec3::splat(both) * masking(mirrored);
                 ways.transmittance = surface.transmission * (1.0 - both);
             }
@@ -194,6 +261,12 @@ fn is_optical(material: &Material) -> bool {
     let shines = material.metallic > 0.0 || (material.specular > 0.0 && material.ior != 1.0);
     !material.unlit
         && (material.transmission > 0.0 || (shines && !wide) || matches!(material.alpha_mode, AlphaMode::Blend))
+}
+
+/// Whether light passes a material straight on, in part: a thin wall, or one that covers in part.
+fn is_passed(material: &Material) -> bool {
+    let thin = material.transmission > 0.0 && material.thickness <= 0.0;
+    !material.unlit && (thin || matches!(material.alpha_mode, AlphaMode::Blend))
 }
 
 #[cfg(test)]

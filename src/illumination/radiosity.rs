@@ -10,7 +10,7 @@
 //! (GCR, Eisenstat, Elman & Schultz 1983), each colour for itself.
 
 use super::elements::{Elements, NONE, Senders};
-use super::paths::{Continuation, Mirrors};
+use super::paths::{Continuation, Optics};
 use super::sampling::hemisphere;
 use crate::error::Result;
 use crate::progress::Progress;
@@ -22,18 +22,16 @@ use rayon::prelude::*;
 /// Where a gathering ray has ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum End {
-    /// On a sender of the mesh, its light weighted by a colour.
-    Sender(u32, Vec3),
+    /// On a sender of the mesh.
+    Sender(u32),
     /// On something that reflects nothing diffusely.
     Black,
     /// Nowhere.
     Escaped,
 }
 
-const ESCAPED: u32 = NONE;
-const BLACK: u32 = NONE - 1;
-/// The ray came by way of a mirror; its leaf and weight stand in the vertex' list.
-const TINTED: u32 = NONE - 2;
+/// The ray brings nothing, or by way of optics: what it brings then stands in the vertex' list.
+const BLACK: u32 = NONE;
 
 /// The surfaces that gathering rays meet.
 #[derive(Clone, Copy)]
@@ -41,35 +39,37 @@ pub(crate) struct Surroundings<'a> {
     pub(crate) bvh: &'a SceneBvh<'a>,
     pub(crate) mesh: &'a Elements<'a>,
     pub(crate) senders: &'a Senders,
-    pub(crate) mirrors: &'a Mirrors,
+    pub(crate) optics: &'a Optics,
 }
 
 impl Surroundings<'_> {
-    /// Follows a ray to what sends the light that it brings; emission of sampled emitters is not part of that.
-    pub(crate) fn follow(&self, ray: Ray, random: &mut Random) -> End {
+    /// Follows a ray to what sends the light that it brings, with what optics on the way leave of it; emission of sampled
+    /// emitters is not part of that.
+    pub(crate) fn follow(&self, ray: Ray, random: &mut Random) -> (End, Vec3) {
         let mut ray = ray;
         let mut weight = Vec3::ONE;
-        for _ in 0..self.mirrors.bounces {
-            let Some(meeting) = self.bvh.meet(&ray, 0.0, f64::INFINITY, Sides::Both) else { return End::Escaped };
-            let mut factor = 1.0;
-            if self.mirrors.optical[meeting.triangle as usize] {
-                match self.mirrors.next(self.bvh, &ray, &meeting, random) {
-                    Continuation::Onward(next, tint) => {
+        for _ in 0..self.optics.bounces {
+            let Some(meeting) = self.bvh.meet(&ray, 0.0, f64::INFINITY, Sides::Both) else {
+                return (End::Escaped, weight);
+            };
+            if self.optics.optical[meeting.triangle as usize] {
+                match self.optics.next(self.bvh, &ray, &meeting, random) {
+                    Continuation::Onward(next, tint, _) => {
                         ray = next;
                         weight *= tint;
                         continue;
                     }
-                    Continuation::Absorbed => return End::Black,
-                    Continuation::Diffuse(share) => factor = share,
+                    Continuation::Absorbed => return (End::Black, weight),
+                    Continuation::Diffuse(share) => weight *= share,
                 }
             }
             let sender = self
                 .mesh
                 .locate(meeting.triangle, meeting.front, meeting.barycentric)
                 .and_then(|(element, weights)| self.mesh.sender(self.bvh, self.senders, element, weights));
-            return sender.map_or(End::Black, |sender| End::Sender(sender, weight * factor));
+            return (sender.map_or(End::Black, End::Sender), weight);
         }
-        End::Black
+        (End::Black, weight)
     }
 }
 
@@ -82,6 +82,17 @@ pub(crate) struct Transport {
     tinted: Vec<Vec<(u32, Vec3)>>,
     /// Rays of each vertex that count (those above its horizon).
     counted: Vec<f32>,
+    /// Parts of each vertex' light that escape, and that end on black or in optics.
+    losses: Vec<(Vec3, Vec3)>,
+}
+
+/// What one vertex found beside the senders that it sees plainly.
+#[derive(Default)]
+struct Found {
+    tinted: Vec<(u32, Vec3)>,
+    counted: f32,
+    escaped: Vec3,
+    absorbed: Vec3,
 }
 
 impl Transport {
@@ -91,41 +102,50 @@ impl Transport {
         let rays = side * side;
         let mut ends = vec![BLACK; mesh.vertices.len() * rays];
         progress.start("gathering indirect light", mesh.vertices.len() as u64);
-        let rest: Vec<(Vec<(u32, Vec3)>, f32)> = ends
+        let found: Vec<Found> = ends
             .par_chunks_mut(rays.max(1))
             .zip(&mesh.vertices)
             .enumerate()
             .map(|(index, (ends, vertex))| {
                 progress.advance(1);
+                let mut found = Found::default();
                 if vertex.buried || progress.stopped() {
-                    return (Vec::new(), rays as f32);
+                    found.counted = rays as f32;
+                    found.absorbed = Vec3::splat(found.counted);
+                    return found;
                 }
                 let mut random = Random::new(seed, index as u64);
                 let (facing, origin) = (vertex.facing(), vertex.origin(bvh.offset()));
-                let (mut tinted, mut counted) = (Vec::new(), 0.0);
                 let directions: Vec<DVec3> = hemisphere(vertex.normal, side, &mut random).collect();
                 let mut random = Random::new(seed ^ 0x5bd1, index as u64);
                 for (end, direction) in ends.iter_mut().zip(directions) {
                     if direction.dot(facing) <= 0.0 {
                         continue;
                     }
-                    counted += 1.0;
-                    *end = match around.follow(Ray { origin, direction }, &mut random) {
-                        End::Escaped => ESCAPED,
+                    found.counted += 1.0;
+                    let (reached, tint) = around.follow(Ray { origin, direction }, &mut random);
+                    let left = if reached == End::Black { Vec3::ZERO } else { tint };
+                    found.absorbed += Vec3::ONE - left;
+                    *end = match reached {
+                        End::Escaped => {
+                            found.escaped += tint;
+                            BLACK
+                        }
                         End::Black => BLACK,
-                        End::Sender(sender, Vec3::ONE) => sender,
-                        End::Sender(sender, weight) => {
-                            tinted.push((sender, weight));
-                            TINTED
+                        End::Sender(sender) if tint == Vec3::ONE => sender,
+                        End::Sender(sender) => {
+                            found.tinted.push((sender, tint));
+                            BLACK
                         }
                     };
                 }
-                (tinted, counted)
+                found
             })
             .collect();
         progress.check()?;
-        let (tinted, counted) = rest.into_iter().unzip();
-        Ok(Self { rays, ends, tinted, counted })
+        let losses = found.iter().map(|f| (f.escaped / f.counted.max(1.0), f.absorbed / f.counted.max(1.0))).collect();
+        let (tinted, counted) = found.into_iter().map(|f| (f.tinted, f.counted)).unzip();
+        Ok(Self { rays, ends, tinted, counted, losses })
     }
 
     /// Mean of the senders' radiance over each vertex' rays: its irradiance over π.
@@ -135,21 +155,16 @@ impl Transport {
             .zip(&self.tinted)
             .zip(&self.counted)
             .map(|((ends, tinted), &counted)| {
-                let plain: Vec3 = ends.iter().filter(|&&e| e < TINTED).map(|&e| radiance[e as usize]).sum();
+                let plain: Vec3 = ends.iter().filter(|&&e| e != BLACK).map(|&e| radiance[e as usize]).sum();
                 let tinted: Vec3 = tinted.iter().map(|&(e, weight)| radiance[e as usize] * weight).sum();
                 (plain + tinted) * (scale / counted.max(1.0))
             })
             .collect()
     }
 
-    /// Parts of a vertex' rays that escape and that end on black.
-    pub(crate) fn losses(&self, vertex: usize) -> (f32, f32) {
-        let ends = &self.ends[vertex * self.rays..][..self.rays];
-        let counted = self.counted[vertex].max(1.0);
-        let escaped = ends.iter().filter(|&&e| e == ESCAPED).count() as f32;
-        let below = self.rays as f32 - self.counted[vertex];
-        let black = ends.iter().filter(|&&e| e == BLACK).count() as f32 - below;
-        (escaped / counted, black.max(0.0) / counted)
+    /// Parts of a vertex' light that escape, and that end on black or in optics.
+    pub(crate) fn losses(&self, vertex: usize) -> (Vec3, Vec3) {
+        self.losses[vertex]
     }
 }
 

@@ -81,4 +81,23 @@ impl Room {
         }
         self.instances += 1;
     }
+
+    /// The part of a sphere's inside round its lowest point, up to a half width, with exact normals towards the middle.
+    pub(crate) fn cap(&mut self, middle: DVec3, radius: f64, half: f64, rings: u32, material: u32) {
+        let point = |i: u32, j: u32| {
+            let theta = (half / radius).asin() * f64::from(i) / f64::from(rings);
+            let phi = std::f64::consts::PI * f64::from(j % (2 * rings)) / f64::from(rings);
+            DVec3::new(theta.sin() * phi.cos(), -theta.cos(), theta.sin() * phi.sin())
+        };
+        for (i, j) in (0..rings).flat_map(|i| (0..2 * rings).map(move |j| (i, j))) {
+            let (a, b, c, d) = (point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1));
+            for (skip, [p, q, r]) in [(false, [a, c, b]), (i == 0, [a, d, c])] {
+                if !skip {
+                    let corners = [p, q, r].map(|n| middle + n * radius);
+                    self.triangle(corners, [p, q, r].map(|n| -n), [Vec2::ZERO; 3], material);
+                }
+            }
+        }
+        self.instances += 1;
+    }
 }

@@ -1,5 +1,6 @@
 //! What a surface does to light at one point: glTF's material with its textures read.
 
+use super::paths::dielectric_reflectance;
 use crate::scene::{AlphaMode, Hit, Scene};
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 
@@ -132,6 +133,23 @@ impl Surface {
     /// Whether anything of the surface scatters light diffusely.
     pub fn is_diffuse(&self) -> bool {
         self.albedo.max_element() > 0.0
+    }
+
+    /// What goes straight on from light that arrives along `direction`: past what is not covered, and through a thin
+    /// wall, whose two faces reflect to and fro.
+    pub(crate) fn straight(&self, direction: DVec3) -> Vec3 {
+        let past = 1.0 - self.coverage;
+        if self.volume || self.transmission.max_element() <= 0.0 {
+            return Vec3::splat(past);
+        }
+        let both = self.thin_wall_reflectance(-self.normal.dot(direction));
+        Vec3::splat(past) + self.transmission * (self.coverage * (1.0 - both))
+    }
+
+    /// Reflectance of both faces of a thin wall with all the light that goes to and fro between them, 2R/(1 + R).
+    pub(crate) fn thin_wall_reflectance(&self, cosine: f64) -> f32 {
+        let one = dielectric_reflectance(cosine.clamp(0.0, 1.0), 1.0 / self.ior) as f32;
+        2.0 * one / (1.0 + one)
     }
 
     /// Schlick's Fresnel reflectance for a cosine of incidence, 1994.
