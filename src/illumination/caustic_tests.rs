@@ -1,9 +1,8 @@
-//! Light by way of mirrors and glass against closed forms and against plain path tracing.
+//! Light by way of mirrors and glass against closed forms.
 
-use super::oracle::Oracle;
 use super::rooms::Room;
 use super::*;
-use crate::scene::{Camera, Material, Sides};
+use crate::scene::{Material, Sides};
 
 fn lit<'s>(bvh: &'s SceneBvh<'s>, settings: IlluminationSettings) -> Illumination<'s> {
     Illumination::new(bvh, settings, &Progress::new()).unwrap()
@@ -15,22 +14,6 @@ fn floor_at(light: &Illumination, x: f64, height: f64, z: f64) -> Vec3 {
     let hit = light.bvh().nearest(&ray, 0.0, Sides::Front).unwrap();
     let surface = Surface::at(light.bvh().scene(), &hit, 0.0);
     light.direct(&surface, &mut Random::new(7, hit.position.x.to_bits() ^ hit.position.z.to_bits().rotate_left(17)))
-}
-
-/// Flux over a square of a floor at height zero [W], sum of colours, above what a lamp sends there straight.
-fn power(light: &Illumination, middle: [f64; 2], half: f64, height: f64, n: u32) -> f64 {
-    let cell = 2.0 * half / f64::from(n);
-    (0..n * n)
-        .into_par_iter()
-        .map(|i| {
-            let x = middle[0] - half + (f64::from(i % n) + 0.5) * cell;
-            let z = middle[1] - half + (f64::from(i / n) + 0.5) * cell;
-            let ray = Ray { origin: DVec3::new(x, height, z), direction: DVec3::NEG_Y };
-            let hit = light.bvh().nearest(&ray, 0.0, Sides::Front).unwrap();
-            let surface = Surface::at(light.bvh().scene(), &hit, 0.0);
-            f64::from(light.caustics.light(surface.position, surface.facing).element_sum()) * PI * cell * cell
-        })
-        .sum()
 }
 
 #[test]
@@ -202,86 +185,4 @@ fn a_thin_pane_dims_and_a_half_covered_one_too() {
     let bvh = SceneBvh::new(&room.scene);
     let dimmed = floor_at(&lit(&bvh, IlluminationSettings::default()), 0.0, 0.1, 0.0) / free;
     assert!((dimmed - Vec3::new(0.9, 0.5, 0.1) * (1.0 - both)).abs().max_element() < 1e-3, "{dimmed}");
-}
-
-/// Means over squares of pixels by this crate and by plain paths, at a few places of a picture.
-fn agrees(room: &Room, camera: &Camera, squares: &[[f64; 2]], paths: u32, tolerance: f64) {
-    let bvh = SceneBvh::new(&room.scene);
-    let light = lit(&bvh, IlluminationSettings::default());
-    eprintln!("{:?}", light.report());
-    let oracle = Oracle::new(&bvh);
-    let half = 0.012;
-    for &[u, v] in squares {
-        let n = 24;
-        let look = |i: u32, random: &mut Random| {
-            let x = u + half * (2.0 * (f64::from(i % n) + random.uniform()) / f64::from(n) - 1.0);
-            let y = v + half * (2.0 * (f64::from(i / n % n) + random.uniform()) / f64::from(n) - 1.0);
-            camera.ray(x, y, 1.0)
-        };
-        let ours: Vec3 = (0..n * n)
-            .map(|i| {
-                let mut random = Random::new(1, u64::from(i));
-                let ray = look(i, &mut random);
-                let hit = bvh.nearest(&ray, 0.0, Sides::Front).unwrap();
-                light.radiance(&hit, &Surface::at(&room.scene, &hit, 0.0), &mut random)
-            })
-            .sum::<Vec3>()
-            / (n * n) as f32;
-        let (sum, squared) = (0..paths)
-            .into_par_iter()
-            .map(|i| {
-                let mut random = Random::new(2, u64::from(i) ^ u.to_bits() ^ v.to_bits());
-                let found = f64::from(oracle.radiance(look(i, &mut random), &mut random).element_sum());
-                (found, found * found)
-            })
-            .reduce(|| (0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
-        let mean = sum / f64::from(paths);
-        let sigma = ((squared / f64::from(paths) - mean * mean) / f64::from(paths)).sqrt();
-        let ratio = f64::from(ours.element_sum()) / mean;
-        eprintln!("({u:.2}, {v:.2}): ratio {ratio:.4} ± {:.4}", sigma / mean);
-        let most = tolerance + 4.0 * sigma / mean;
-        assert!((ratio - 1.0).abs() < most, "at ({u}, {v}): {ours} for a sum of {mean} ± {sigma}");
-    }
-}
-
-/// A white box with a lamp in the ceiling.
-fn white_box(left: Material, right: Material) -> Room {
-    let mut room = Room::default();
-    let white = room.material(Material::diffuse(Vec3::splat(0.7)));
-    let (left, right) = (room.material(left), room.material(right));
-    let lamp = room.material(Material::emitter(Vec3::splat(10.0)));
-    room.cuboid(DVec3::splat(-0.5), DVec3::splat(0.5), true, [left, right, white, white, white, white]);
-    room.quad(DVec3::new(-0.2, 0.499, -0.2), DVec3::X * 0.4, DVec3::Z * 0.4, lamp);
-    room
-}
-
-const SQUARES: [[f64; 2]; 5] = [[0.5, 0.8], [0.35, 0.75], [0.62, 0.85], [0.5, 0.3], [0.25, 0.5]];
-
-#[test]
-fn two_facing_mirrors_agree_with_plain_paths() {
-    let mirror = Material::mirror(Vec3::new(0.9, 0.85, 0.8));
-    let room = white_box(mirror.clone(), mirror);
-    let camera = Camera::looking_at(DVec3::new(0.02, 0.03, 0.49), DVec3::new(0.0, 0.0, -0.5), 1.2);
-    agrees(&room, &camera, &SQUARES[..4], 300_000, 5e-3);
-}
-
-#[test]
-fn a_mirror_ball_a_glass_ball_and_a_block_agree_with_plain_paths() {
-    let matte = Material::diffuse(Vec3::splat(0.7));
-    let mut room = white_box(matte.clone(), matte);
-    let silver = room.material(Material::mirror(Vec3::splat(0.9)));
-    let glass = room.material(Material {
-        transmission: 1.0,
-        thickness: 1.0,
-        roughness: 0.0,
-        ior: 1.5,
-        ..Material::diffuse(Vec3::ONE)
-    });
-    let rough = room.material(Material { roughness: 0.3, ..Material::mirror(Vec3::splat(0.8)) });
-    room.sphere(DVec3::new(-0.25, -0.3, -0.2), 0.15, false, 32, silver);
-    room.sphere(DVec3::new(0.25, -0.3, -0.1), 0.15, false, 32, glass);
-    room.cuboid(DVec3::new(-0.1, -0.5, 0.05), DVec3::new(0.1, -0.4, 0.2), false, [rough; 6]);
-    let camera = Camera::looking_at(DVec3::new(0.02, 0.03, 0.49), DVec3::new(0.0, 0.0, -0.5), 1.2);
-    let squares = [[0.05, 0.85], [0.5, 0.75], [0.7, 0.93], [0.5, 0.3], [0.97, 0.6]];
-    agrees(&room, &camera, &squares, 400_000, 1e-2);
 }

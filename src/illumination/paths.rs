@@ -207,6 +207,8 @@ pub(crate) fn inside(material: &Material, hit: &crate::scene::Hit, distance: f64
 /// The specular ways on from a surface, with how much of the light takes each.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ways {
+    /// Unit normal that reflects and refracts, on the side of the ray.
+    pub(crate) half: DVec3,
     pub(crate) mirrored: DVec3,
     pub(crate) reflectance: Vec3,
     pub(crate) through: DVec3,
@@ -232,7 +234,7 @@ impl Ways {
             // Bent normals may mirror a ray into the surface; flat mirroring is the nearest that can be seen.
             mirrored = reflected(direction, surface.facing);
         }
-        let mut ways = Self { mirrored, reflectance, through: direction, transmittance: Vec3::ZERO, ratio: 1.0 };
+        let mut ways = Self { half, mirrored, reflectance, through: direction, transmittance: Vec3::ZERO, ratio: 1.0 };
         if surface.transmission.max_element() > 0.0 {
             if surface.volume {
                 ways.ratio = if surface.front { 1.0 / surface.ior } else { surface.ior };

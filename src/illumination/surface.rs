@@ -130,6 +130,11 @@ impl Surface {
         self.specular.max_element() > 0.0
     }
 
+    /// Whether its specular ways are those of a smooth surface.
+    pub(crate) fn is_sharp(&self) -> bool {
+        self.alpha <= MIRROR_ALPHA
+    }
+
     /// Whether anything of the surface scatters light diffusely.
     pub fn is_diffuse(&self) -> bool {
         self.albedo.max_element() > 0.0

@@ -1,9 +1,13 @@
 //! Point sources: what the scene's light becomes before it is a wave.
 
+mod eye;
+#[cfg(test)]
+mod eye_tests;
 pub mod images;
 pub mod placement;
 pub mod ply;
 pub mod trace;
+mod wavefront;
 
 pub use placement::{Placed, Placement, place};
 pub use trace::{TraceSettings, Traced, TracedPoint, trace};

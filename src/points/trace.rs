@@ -1,19 +1,33 @@
 //! From an eye's rays to points of light, and to the picture that the eye sees.
 //!
-//! Each pixel's ray gives a point where it meets a surface that scatters or emits light. A ray that meets a mirror goes
-//! on; its point then stands on the *primary* ray, at the length of the whole way eye → mirrors → surface (Nakamura,
-//! Yamaguchi & Yoshikawa): behind a flat mirror that is exactly where the mirror image is.
+//! Each pixel's ray gives a point where it meets a surface that scatters or emits light. A ray that meets a mirror or
+//! glass goes on (`eye`), at glass in two ways: there may be several points on one ray. A point always stands on the
+//! *primary* ray. By default it stands where the eye focuses on it, at the centre of the wave that arrives
+//! (`wavefront`); on request at the length of the whole way eye → mirrors → surface (Nakamura, Yamaguchi & Yoshikawa).
+//! Behind flat mirrors both are the same.
 
 use crate::error::{Error, Result};
-use crate::illumination::paths::Ways;
-use crate::illumination::{Illumination, Surface};
+use crate::illumination::Illumination;
+use crate::points::eye::{Eye, Seen};
 use crate::progress::Progress;
 use crate::random::Random;
-use crate::scene::bvh::{Ray, Sides};
-use crate::scene::{Camera, Projection};
+use crate::scene::Camera;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::time::Instant;
+
+/// At which distance a point stands that is seen by way of mirrors or glass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MirrorDepth {
+    /// The length of the whole way, as in the seed paper: right for flat mirrors.
+    Path,
+    /// Where the eye focuses: also right for curved mirrors, lenses and glass plates.
+    #[default]
+    Focus,
+}
+
+/// Ends of a ray that bring less than this part of its light make no point of their own.
+const LEAST_SHARE: f32 = 0.01;
 
 /// How a scene is looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,13 +40,15 @@ pub struct TraceSettings {
     pub bounces: u32,
     /// Sub-rays along each side of a pixel that covers an edge; 1 takes pixel centres only.
     pub edge_rays: u32,
+    /// Where points stand that are seen by way of optics.
+    pub mirror_depth: MirrorDepth,
     /// Seed of all sampling.
     pub seed: u64,
 }
 
 impl Default for TraceSettings {
     fn default() -> Self {
-        Self { width: 500, height: 500, bounces: 8, edge_rays: 4, seed: 1 }
+        Self { width: 500, height: 500, bounces: 32, edge_rays: 4, mirror_depth: MirrorDepth::Focus, seed: 1 }
     }
 }
 
@@ -64,7 +80,8 @@ pub struct Traced {
     pub height: u32,
     /// Mean radiance over each pixel, row 0 on top, linear RGB [W/(m² sr)].
     pub picture: Vec<[f32; 3]>,
-    /// Points in the order of their pixels; a pixel whose ray meets nothing, or only darkness, has none.
+    /// Points in the order of their pixels, the strongest of a pixel first; a pixel whose ray meets nothing, or only
+    /// darkness, has none, one that is seen by several ways through glass has several.
     pub points: Vec<TracedPoint>,
     /// Counts and time.
     pub report: TraceReport,
@@ -83,18 +100,6 @@ pub struct TraceReport {
     pub edges: u64,
     /// Time [s].
     pub seconds: f64,
-}
-
-/// One ray's end.
-#[derive(Clone, Copy, Debug)]
-struct Seen {
-    radiance: Vec3,
-    /// Whole length of the way [m]; zero for a miss.
-    path: f64,
-    bounces: u8,
-    /// First surface: triangle, and its unit normal; tells edges.
-    first: u32,
-    normal: DVec3,
 }
 
 /// Traces one ray per pixel.
@@ -144,29 +149,26 @@ pub fn trace(light: &Illumination, camera: &Camera, settings: &TraceSettings, pr
         })
         .collect();
     progress.check()?;
-    let points: Vec<TracedPoint> = seen
-        .iter()
-        .enumerate()
-        .filter(|(_, seen)| seen.path > 0.0 && seen.radiance.max_element() > 0.0)
-        .map(|(pixel, seen)| {
-            let (column, row) = (pixel as u32 % width, pixel as u32 / width);
-            let ray = eye.ray(f64::from(column) + 0.5, f64::from(row) + 0.5);
-            TracedPoint {
-                eye: ray.origin,
-                position: ray.at(seen.path),
-                radiance: seen.radiance.to_array(),
-                distance: seen.path,
-                pixel: pixel as u32,
-                bounces: seen.bounces,
-                instance: light.bvh().scene().triangles[seen.first as usize].instance,
-            }
-        })
-        .collect();
+    let mut points = Vec::with_capacity(seen.len());
+    for (pixel, seen) in seen.iter().enumerate().filter(|(_, seen)| !seen.ends.is_empty()) {
+        let (column, row) = (pixel as u32 % width, pixel as u32 / width);
+        let ray = eye.ray(f64::from(column) + 0.5, f64::from(row) + 0.5);
+        let least = LEAST_SHARE * seen.radiance.element_sum();
+        points.extend(seen.ends.iter().filter(|end| end.radiance.element_sum() >= least).map(|end| TracedPoint {
+            eye: ray.origin,
+            position: ray.at(end.depth),
+            radiance: end.radiance.to_array(),
+            distance: end.depth,
+            pixel: pixel as u32,
+            bounces: end.bounces,
+            instance: light.bvh().scene().triangles[seen.first as usize].instance,
+        }));
+    }
     let edges = edge.iter().filter(|&&e| e).count() as u64;
     let again = if settings.edge_rays > 1 { edges * u64::from(settings.edge_rays * settings.edge_rays) } else { 0 };
     let report = TraceReport {
         rays: pixels + again,
-        missed: seen.iter().filter(|s| s.path <= 0.0).count() as u64,
+        missed: seen.iter().filter(|s| s.first == u32::MAX).count() as u64,
         by_mirror: points.iter().filter(|p| p.bounces > 0).count() as u64,
         edges,
         seconds: begin.elapsed().as_secs_f64(),
@@ -174,20 +176,14 @@ pub fn trace(light: &Illumination, camera: &Camera, settings: &TraceSettings, pr
     Ok(Traced { width, height, picture, points, report })
 }
 
-impl Seen {
-    fn nothing() -> Self {
-        Self { radiance: Vec3::ZERO, path: 0.0, bounces: 0, first: u32::MAX, normal: DVec3::ZERO }
-    }
-}
-
 /// Whether a pixel and a neighbour show different things: other surfaces, or a crease between them.
 fn is_edge(seen: &[Seen], pixel: usize, width: usize) -> bool {
     let here = &seen[pixel];
     let column = pixel % width;
     let differs = |other: &Seen| {
-        let depth = (other.path - here.path).abs() > 0.02 * here.path.min(other.path);
+        let depth = (other.depth - here.depth).abs() > 0.02 * here.depth.min(other.depth);
         let crease = other.first != here.first && other.normal.dot(here.normal) < 0.99;
-        (other.path > 0.0) != (here.path > 0.0) || other.bounces != here.bounces || depth || crease || {
+        (other.depth > 0.0) != (here.depth > 0.0) || other.bounces != here.bounces || depth || crease || {
             let (a, b) = (here.radiance.max_element(), other.radiance.max_element());
             (a - b).abs() > 0.5 * a.max(b)
         }
@@ -206,75 +202,6 @@ fn is_edge(seen: &[Seen], pixel: usize, width: usize) -> bool {
         near[3] = Some(pixel + width);
     }
     near.into_iter().flatten().any(|other| differs(&seen[other]))
-}
-
-struct Eye<'a> {
-    light: &'a Illumination<'a>,
-    camera: &'a Camera,
-    settings: &'a TraceSettings,
-    aspect: f64,
-}
-
-impl Eye<'_> {
-    fn ray(&self, column: f64, row: f64) -> Ray {
-        let (u, v) = (column / f64::from(self.settings.width), row / f64::from(self.settings.height));
-        self.camera.ray(u, v, self.aspect)
-    }
-
-    /// Width of a pixel at a distance along its ray [m].
-    fn footprint(&self, distance: f64) -> f64 {
-        let (_, half_height) = self.camera.half_size(self.aspect);
-        let at_one_metre = 2.0 * half_height / f64::from(self.settings.height);
-        match self.camera.projection {
-            Projection::Perspective { .. } => at_one_metre * distance,
-            Projection::Orthographic { .. } => at_one_metre,
-        }
-    }
-
-    fn look(&self, column: f64, row: f64, random: &mut Random) -> Seen {
-        let bvh = self.light.bvh();
-        let mut ray = self.ray(column, row);
-        let mut seen = Seen::nothing();
-        let mut weight = Vec3::ONE;
-        let mut path = 0.0;
-        let mut leaving: Option<DVec3> = None;
-        for bounce in 0..=self.settings.bounces {
-            let hit = match leaving {
-                None => bvh.nearest(&ray, 0.0, Sides::Front),
-                Some(normal) => bvh.nearest_leaving(&ray, normal, Sides::Front),
-            };
-            let Some(hit) = hit else { break };
-            path += hit.distance;
-            let surface = Surface::at(bvh.scene(), &hit, self.footprint(path));
-            if bounce == 0 {
-                seen.first = hit.triangle;
-                seen.normal = surface.normal;
-            }
-            let ways = Ways::new(&surface, ray.direction, random);
-            if let Some((direction, tint)) = onward(&surface, &ways) {
-                ray = Ray { origin: surface.position, direction };
-                leaving = Some(surface.facing);
-                seen.radiance += weight * surface.emission;
-                weight *= tint;
-                continue;
-            }
-            seen.radiance += weight * self.light.radiance(&hit, &surface, random);
-            seen.path = path;
-            seen.bounces = bounce as u8;
-            return seen;
-        }
-        seen
-    }
-}
-
-/// Whether the eye's ray goes on: where the surface mirrors or transmits more than it scatters.
-fn onward(surface: &Surface, ways: &Ways) -> Option<(DVec3, Vec3)> {
-    let (r, t) = (ways.reflectance.max_element(), ways.transmittance.max_element());
-    let d = surface.albedo.max_element();
-    if surface.unlit || (r <= d && t <= d) {
-        return None;
-    }
-    Some(if r >= t { (ways.mirrored, ways.reflectance) } else { (ways.through, ways.transmittance) })
 }
 
 #[cfg(test)]

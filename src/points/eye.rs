@@ -1,0 +1,253 @@
+//! What one ray of an eye sees: one end per way that light takes through mirrors and glass.
+//!
+//! At a mirror or a pane of glass a ray goes on, at glass in two ways; each way ends where something scatters or emits.
+//! A rough surface sends several rays into its lobe, which together are one end. Ways that have become weak are followed
+//! by chance, their weight raised in turn, so that the sum stays right.
+
+use super::wavefront::{Wavefront, normal_change};
+use crate::illumination::paths::{Ways, inside};
+use crate::illumination::{Illumination, Surface};
+use crate::points::trace::{MirrorDepth, TraceSettings};
+use crate::random::Random;
+use crate::scene::bvh::{Ray, Sides};
+use crate::scene::{Camera, Projection};
+use glam::{DVec3, Vec3};
+
+/// Rays into the lobe of a rough surface that reflects everything; fewer where it reflects less.
+const LOBE_RAYS: f32 = 16.0;
+/// Ways that bring less than this part of a white surface's light are followed by chance.
+const FAINT: f32 = 0.01;
+/// Ways followed at once; further ones are chosen from by chance.
+const MOST_WAYS: usize = 48;
+/// An image nearer than this part of the way, or farther than its inverse, or behind the eye, is put at that distance.
+const NEAREST: f64 = 0.02;
+
+/// Light by one way.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct End {
+    pub(crate) radiance: Vec3,
+    /// Where it seems to be, along the eye's ray [m].
+    pub(crate) depth: f64,
+    /// Mirrors and glass surfaces passed.
+    pub(crate) bounces: u8,
+    /// Which ends belong together: lobe rays of one rough surface share a number.
+    group: u16,
+}
+
+/// All that one ray sees.
+#[derive(Clone, Debug)]
+pub(crate) struct Seen {
+    /// Sum of all ends.
+    pub(crate) radiance: Vec3,
+    /// The strongest end's depth [m]; zero for a miss.
+    pub(crate) depth: f64,
+    /// The strongest end's mirrors.
+    pub(crate) bounces: u8,
+    /// First surface: triangle, and its unit normal; tells edges.
+    pub(crate) first: u32,
+    pub(crate) normal: DVec3,
+    /// Ends, strongest first.
+    pub(crate) ends: Vec<End>,
+}
+
+impl Seen {
+    /// A ray that meets nothing.
+    pub(crate) fn nothing() -> Self {
+        Self { radiance: Vec3::ZERO, depth: 0.0, bounces: 0, first: u32::MAX, normal: DVec3::ZERO, ends: Vec::new() }
+    }
+}
+
+/// An eye before a lit scene.
+pub(crate) struct Eye<'a> {
+    pub(crate) light: &'a Illumination<'a>,
+    pub(crate) camera: &'a Camera,
+    pub(crate) settings: &'a TraceSettings,
+    pub(crate) aspect: f64,
+}
+
+/// A ray on its way.
+struct Branch {
+    ray: Ray,
+    weight: Vec3,
+    path: f64,
+    bounces: u32,
+    /// Geometric normal of the surface that it leaves.
+    leaving: Option<DVec3>,
+    wave: Wavefront,
+    group: Option<u16>,
+}
+
+impl Eye<'_> {
+    /// The ray through a place of the picture, in pixels.
+    pub(crate) fn ray(&self, column: f64, row: f64) -> Ray {
+        let (u, v) = (column / f64::from(self.settings.width), row / f64::from(self.settings.height));
+        self.camera.ray(u, v, self.aspect)
+    }
+
+    /// Width of a pixel at a distance along its ray [m].
+    fn footprint(&self, distance: f64) -> f64 {
+        let (_, half_height) = self.camera.half_size(self.aspect);
+        let at_one_metre = 2.0 * half_height / f64::from(self.settings.height);
+        match self.camera.projection {
+            Projection::Perspective { .. } => at_one_metre * distance,
+            Projection::Orthographic { .. } => at_one_metre,
+        }
+    }
+
+    /// Follows the ray through a place of the picture.
+    pub(crate) fn look(&self, column: f64, row: f64, random: &mut Random) -> Seen {
+        let ray = self.ray(column, row);
+        let mut seen = Seen::nothing();
+        let mut ends: Vec<End> = Vec::new();
+        let mut groups = 0u16;
+        let first = Branch {
+            ray,
+            weight: Vec3::ONE,
+            path: 0.0,
+            bounces: 0,
+            leaving: None,
+            wave: Wavefront::new(ray.direction),
+            group: None,
+        };
+        let mut open = vec![first];
+        while let Some(branch) = open.pop() {
+            self.step(branch, &mut seen, &mut ends, &mut open, &mut groups, random);
+        }
+        seen.ends = gathered(ends);
+        if let Some(strongest) = seen.ends.first() {
+            seen.depth = strongest.depth;
+            seen.bounces = strongest.bounces;
+        }
+        seen
+    }
+
+    /// Takes a branch to its next surface.
+    fn step(
+        &self,
+        mut branch: Branch,
+        seen: &mut Seen,
+        ends: &mut Vec<End>,
+        open: &mut Vec<Branch>,
+        groups: &mut u16,
+        random: &mut Random,
+    ) {
+        let bvh = self.light.bvh();
+        let ray = branch.ray;
+        let hit = match branch.leaving {
+            None => bvh.nearest(&ray, 0.0, Sides::Front),
+            Some(normal) => bvh.nearest_leaving(&ray, normal, Sides::Front),
+        };
+        let Some(hit) = hit else { return };
+        branch.path += hit.distance;
+        let surface = Surface::at(bvh.scene(), &hit, self.footprint(branch.path));
+        if branch.bounces == 0 && branch.leaving.is_none() {
+            seen.first = hit.triangle;
+            seen.normal = surface.normal;
+        }
+        branch.wave.advance(ray.direction, hit.distance, surface.normal);
+        branch.weight *= inside(bvh.scene().material(hit.triangle), &hit, hit.distance);
+        let own = |weight: Vec3, ray: Ray| Branch { ray, weight, leaving: Some(surface.facing), ..branch };
+        if surface.coverage < 1.0 {
+            let past = Ray { origin: surface.position, direction: ray.direction };
+            let weight = branch.weight * (1.0 - surface.coverage);
+            push(open, own(weight, past), random);
+            branch.weight *= surface.coverage;
+        }
+        if surface.is_diffuse() || surface.emission.max_element() > 0.0 {
+            let radiance = branch.weight * self.light.radiance(&hit, &surface, random);
+            let group = branch.group.unwrap_or_else(|| next(groups));
+            let depth = self.depth(&branch);
+            seen.radiance += radiance;
+            ends.push(End { radiance, depth, bounces: branch.bounces.min(255) as u8, group });
+        }
+        if surface.unlit || branch.bounces >= self.settings.bounces {
+            return;
+        }
+        // One look tells how strong the ways are; for a rough surface each ray of its lobe looks again.
+        let mut ways = Ways::new(&surface, ray.direction, random);
+        let strength = (ways.reflectance + ways.transmittance).max_element().min(1.0);
+        if strength <= 0.0 {
+            return;
+        }
+        let lobe = if surface.is_sharp() || branch.group.is_some() {
+            1
+        } else {
+            (LOBE_RAYS * strength * branch.weight.max_element().min(1.0)).ceil().clamp(1.0, LOBE_RAYS) as u32
+        };
+        let groups: [Option<u16>; 2] = match (branch.group, surface.is_sharp()) {
+            (None, false) => [Some(next(groups)), Some(next(groups))],
+            (group, _) => [group; 2],
+        };
+        let change = normal_change(bvh.scene(), &hit);
+        for number in 0..lobe {
+            if number > 0 {
+                ways = Ways::new(&surface, ray.direction, random);
+            }
+            let share = branch.weight / lobe as f32;
+            let half = ways.half;
+            let mut mirrored = Branch {
+                bounces: branch.bounces + 1,
+                group: groups[0],
+                ..own(share * ways.reflectance, Ray { origin: surface.position, direction: ways.mirrored })
+            };
+            mirrored.wave.reflect(ray.direction, half, &change);
+            push(open, mirrored, random);
+            let mut through = Branch {
+                bounces: branch.bounces + 1,
+                group: groups[1],
+                ..own(share * ways.transmittance, Ray { origin: surface.position, direction: ways.through })
+            };
+            if surface.volume {
+                through.wave.refract(ray.direction, half, ways.ratio, &change);
+            }
+            push(open, through, random);
+        }
+    }
+
+    /// Where along the eye's ray light of a finished branch seems to come from [m].
+    fn depth(&self, branch: &Branch) -> f64 {
+        if self.settings.mirror_depth == MirrorDepth::Path || branch.bounces == 0 {
+            return branch.path;
+        }
+        let vergence = branch.wave.vergence(branch.ray.direction) * branch.path;
+        if vergence.is_nan() { branch.path } else { branch.path / vergence.clamp(NEAREST, 1.0 / NEAREST) }
+    }
+}
+
+fn next(groups: &mut u16) -> u16 {
+    *groups = groups.wrapping_add(1);
+    *groups
+}
+
+/// Opens a way if it is strong enough, by chance if it is faint.
+fn push(open: &mut Vec<Branch>, mut branch: Branch, random: &mut Random) {
+    let strength = branch.weight.max_element();
+    let faint = if open.len() >= MOST_WAYS { 1.0 } else { FAINT };
+    if strength < faint {
+        if random.uniform_f32() * faint >= strength {
+            return;
+        }
+        branch.weight *= faint / strength;
+    }
+    open.push(branch);
+}
+
+/// Puts ends of one group together, at the mean of their vergence weighted by light; strongest first.
+fn gathered(ends: Vec<End>) -> Vec<End> {
+    let mut sums: Vec<(End, f64, f64)> = Vec::with_capacity(ends.len());
+    for end in ends {
+        let light = f64::from(end.radiance.element_sum());
+        match sums.iter_mut().find(|(sum, _, _)| sum.group == end.group) {
+            Some((sum, total, vergence)) => {
+                sum.radiance += end.radiance;
+                sum.bounces = sum.bounces.max(end.bounces);
+                *total += light;
+                *vergence += light / end.depth;
+            }
+            None => sums.push((end, light, light / end.depth)),
+        }
+    }
+    sums.sort_by(|a, b| b.1.total_cmp(&a.1));
+    sums.retain(|(_, light, _)| *light > 0.0);
+    sums.into_iter().map(|(end, light, vergence)| End { depth: light / vergence, ..end }).collect()
+}
