@@ -13,7 +13,11 @@ fn floor_at(light: &Illumination, x: f64, height: f64, z: f64) -> Vec3 {
     let ray = Ray { origin: DVec3::new(x, height, z), direction: DVec3::NEG_Y };
     let hit = light.bvh().nearest(&ray, 0.0, Sides::Front).unwrap();
     let surface = Surface::at(light.bvh().scene(), &hit, 0.0);
-    light.direct(&surface, &mut Random::new(7, hit.position.x.to_bits() ^ hit.position.z.to_bits().rotate_left(17)))
+    light.direct(
+        &hit,
+        &surface,
+        &mut Random::new(7, hit.position.x.to_bits() ^ hit.position.z.to_bits().rotate_left(17)),
+    )
 }
 
 #[test]

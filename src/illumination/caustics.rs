@@ -108,11 +108,6 @@ impl Caustics {
     pub(crate) fn light(&self, position: DVec3, facing: DVec3) -> Vec3 {
         self.levels.iter().map(|level| level.light(position, facing)).sum::<Vec3>() * (1.0 / PI) as f32
     }
-
-    /// Whether there is no such light at all.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.levels.is_empty()
-    }
 }
 
 impl Level {

@@ -263,9 +263,14 @@ impl<'s> Elements<'s> {
         }
     }
 
+    /// Whether an element is not split.
+    pub(crate) fn is_leaf(&self, element: u32) -> bool {
+        self.nodes[element as usize].children == 0
+    }
+
     /// Elements that are not split.
     pub(crate) fn leaves(&self) -> impl Iterator<Item = u32> {
-        (0..self.nodes.len() as u32).filter(|&e| self.nodes[e as usize].children == 0)
+        (0..self.nodes.len() as u32).filter(|&e| self.is_leaf(e))
     }
 
     /// Area of an element [m²].
@@ -274,7 +279,8 @@ impl<'s> Elements<'s> {
         0.5 * (b - a).cross(c - a).length()
     }
 
-    fn corners(&self, element: usize) -> [DVec3; 3] {
+    /// Corners of an element [m].
+    pub(crate) fn corners(&self, element: usize) -> [DVec3; 3] {
         self.elements[element].corners.map(|v| self.vertices[v as usize].position)
     }
 
@@ -284,7 +290,7 @@ impl<'s> Elements<'s> {
     }
 
     /// Unit geometric normal of an element's side.
-    fn facing(&self, triangle: u32, front: bool) -> DVec3 {
+    pub(crate) fn facing(&self, triangle: u32, front: bool) -> DVec3 {
         self.scene.triangles[triangle as usize].normal() * if front { 1.0 } else { -1.0 }
     }
 

@@ -7,6 +7,7 @@
 use super::form_factor::{FormFactor, point_to_element, point_to_polygon};
 use super::paths::Optics;
 use super::sampling::triangle_weights;
+use super::shaft::Shaft;
 use super::surface::Surface;
 use crate::random::Random;
 use crate::scene::bvh::{Hit, SceneBvh};
@@ -185,7 +186,12 @@ pub(crate) struct ShadowRays {
     pub(crate) first: u32,
     /// Second set for an emitter that the first one saw in part.
     pub(crate) penumbra: u32,
+    /// Emitters, one bit each, that are known to be seen whole.
+    pub(crate) clear: Clear,
 }
+
+/// Emitters that a piece of a surface sees whole, one bit each for the first ones.
+pub(crate) type Clear = u16;
 
 impl Emitters {
     pub(crate) fn new(scene: &Scene, form_factor: FormFactor) -> Self {
@@ -229,6 +235,19 @@ impl Emitters {
         Self { polygons, sampled, punctual: scene.lights.clone(), form_factor }
     }
 
+    /// Which emitters every point of a flat piece of a surface sees whole.
+    pub(crate) fn clear(&self, bvh: &SceneBvh, piece: &[DVec3], facing: DVec3) -> Clear {
+        let tolerance = 2.0 * bvh.offset();
+        let clear = |emitter: &Emitter| {
+            let above = (piece[0] - emitter.corners[0]).dot(emitter.normal) > 0.0;
+            let shining = if above || !emitter.two_sided { emitter.normal } else { -emitter.normal };
+            emitter.textured.is_none()
+                && Shaft::new(piece, facing, &emitter.corners, shining, tolerance).is_some_and(|s| s.is_clear(bvh))
+        };
+        let first = self.polygons.iter().take(Clear::BITS as usize).enumerate();
+        first.filter(|(_, emitter)| clear(emitter)).fold(0, |bits, (index, _)| bits | 1 << index)
+    }
+
     /// Irradiance over π [W/(m² sr)] at a point with unit shading `normal`; the point must be lifted off its surface.
     pub(crate) fn light(
         &self,
@@ -270,6 +289,10 @@ impl Emitters {
         }
         for &(index, factor) in &seen[..count] {
             let emitter = &self.polygons[index];
+            if index < Clear::BITS as usize && rays.clear >> index & 1 == 1 {
+                sum += emitter.radiance * factor as f32;
+                continue;
+            }
             let share = factor * f64::from(emitter.radiance.element_sum()) / total;
             let side = (f64::from(rays.first) * share).sqrt().ceil().max(1.0) as u32;
             let mut tally = Tally::default();

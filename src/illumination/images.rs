@@ -138,7 +138,7 @@ impl Images {
 
     /// The same from all others.
     pub(crate) fn weak(&self, around: Around, point: DVec3, normal: DVec3, random: &mut Random) -> Vec3 {
-        let rays = ShadowRays { first: 4, penumbra: 0 };
+        let rays = ShadowRays { first: 4, penumbra: 0, clear: 0 };
         self.weak.iter().map(|image| image.light(around, point, normal, rays, random)).sum()
     }
 }

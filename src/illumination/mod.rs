@@ -28,6 +28,7 @@ mod radiosity;
 #[cfg(test)]
 pub(crate) mod rooms;
 mod sampling;
+mod shaft;
 pub mod surface;
 #[cfg(test)]
 mod tests;
@@ -42,7 +43,7 @@ use crate::random::Random;
 use crate::scene::bvh::{Hit, Ray, SceneBvh};
 use caustics::Caustics;
 use elements::{Elements, Fineness, Senders};
-use emitters::{Emitters, ShadowRays};
+use emitters::{Clear, Emitters, ShadowRays};
 use glam::{DVec3, Vec3};
 use images::{Around, Images};
 use patches::Patches;
@@ -89,12 +90,12 @@ impl Default for IlluminationSettings {
         Self {
             form_factor: FormFactor::Lambert,
             residual: 1e-4,
-            indirect_rays: 1024,
+            indirect_rays: 400,
             shadow_rays: 16,
             penumbra_rays: 64,
             longest_element: 1.0 / 16.0,
-            shortest_element: 1.0 / 160.0,
-            nearness: 0.5,
+            shortest_element: 1.0 / 80.0,
+            nearness: 0.8,
             most_vertices: 60_000,
             final_gather: None,
             bounces: 32,
@@ -163,6 +164,8 @@ pub struct Illumination<'s> {
     optics: Optics,
     images: Images,
     caustics: Caustics,
+    /// Emitters that each leaf of the mesh sees whole.
+    clear: Vec<Clear>,
     senders: Senders,
     /// Radiance that leaves each sender, without sampled emission.
     leaving: Vec<Vec3>,
@@ -201,7 +204,8 @@ impl<'s> Illumination<'s> {
         let around = Around { bvh, optics: &optics, emitters: &emitters };
         let images = Images::new(around, &mesh.some_places(MOST_PLACES, bvh.offset()));
         let weak = weak_light(around, &images, &mesh, settings.seed ^ 0x3ea7, progress)?;
-        let mut patches = Patches::new(around, &images, &mesh, &senders, &settings, progress)?;
+        let clear = clear_views(around, &mesh);
+        let mut patches = Patches::new(around, &images, &mesh, &senders, &clear, &settings, progress)?;
         for (direct, &sender) in patches.direct.iter_mut().zip(&senders.all) {
             *direct += mesh.mean_over(sender, &weak);
         }
@@ -234,6 +238,7 @@ impl<'s> Illumination<'s> {
             optics,
             images,
             caustics,
+            clear,
             senders,
             leaving,
             irradiance,
@@ -273,15 +278,17 @@ impl<'s> Illumination<'s> {
         if !surface.is_diffuse() {
             return surface.emission;
         }
-        surface.emission + surface.albedo * (self.direct(surface, random) + self.indirect(hit, surface, random))
+        surface.emission + surface.albedo * (self.direct(hit, surface, random) + self.indirect(hit, surface, random))
     }
 
     /// Irradiance over π that comes from lamps, straight or by way of mirrors and glass.
-    pub fn direct(&self, surface: &Surface, random: &mut Random) -> Vec3 {
+    pub fn direct(&self, hit: &Hit, surface: &Surface, random: &mut Random) -> Vec3 {
         let point = surface.position + surface.facing * self.bvh.offset();
-        let rays = ShadowRays { first: self.settings.shadow_rays, penumbra: self.settings.penumbra_rays };
+        let element = self.mesh.locate(hit.triangle, hit.front, hit.barycentric.map(|b| b as f32));
+        let clear = element.map_or(0, |(element, _)| self.clear[element as usize]);
+        let rays = ShadowRays { first: self.settings.shadow_rays, penumbra: self.settings.penumbra_rays, clear };
         let straight = self.emitters.light(self.bvh, &self.optics, point, surface.normal, rays, random);
-        let rays = ShadowRays { first: rays.first.div_ceil(2), penumbra: rays.penumbra / 2 };
+        let rays = ShadowRays { first: rays.first.div_ceil(2), penumbra: rays.penumbra / 2, ..rays };
         let mirrored = self.images.strong(self.around(), point, surface.normal, rays, random);
         straight + mirrored + self.caustics.light(surface.position, surface.facing)
     }
@@ -332,6 +339,16 @@ impl<'s> Illumination<'s> {
     fn around(&self) -> Around<'_> {
         Around { bvh: self.bvh, optics: &self.optics, emitters: &self.emitters }
     }
+}
+
+/// Which emitters each leaf of the mesh sees whole.
+fn clear_views(around: Around, mesh: &Elements) -> Vec<Clear> {
+    let each = mesh.elements.par_iter().enumerate().map(|(index, element)| {
+        let facing = mesh.facing(element.triangle, element.front);
+        let leaf = mesh.is_leaf(index as u32);
+        if leaf { around.emitters.clear(around.bvh, &mesh.corners(index), facing) } else { 0 }
+    });
+    each.collect()
 }
 
 /// Light of weak images at the vertices: irradiance over π.

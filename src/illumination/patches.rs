@@ -2,7 +2,7 @@
 
 use super::IlluminationSettings;
 use super::elements::{Elements, Senders};
-use super::emitters::{Emitters, ShadowRays};
+use super::emitters::{Clear, Emitters, ShadowRays};
 use super::images::{Around, Images};
 use super::photons::Photon;
 use super::radiosity::{End, Surroundings, Transport};
@@ -28,11 +28,13 @@ pub(crate) struct Patches {
 
 impl Patches {
     /// Reads materials and samples direct light at a few places of each sender.
+    #[allow(clippy::too_many_arguments)]
     pub(crate) fn new(
         around: Around,
         images: &Images,
         mesh: &Elements,
         senders: &Senders,
+        clear: &[Clear],
         settings: &IlluminationSettings,
         progress: &Progress,
     ) -> Result<Self> {
@@ -53,7 +55,11 @@ impl Patches {
                 // A share of the rays of a picture's point at each place: the mean over the patch is what counts.
                 let places = mesh.places(sender);
                 let share = places.len() as u32;
-                let rays = ShadowRays { first: settings.shadow_rays.div_ceil(share), penumbra: 0 };
+                let rays = ShadowRays {
+                    first: settings.shadow_rays.div_ceil(share),
+                    penumbra: 0,
+                    clear: clear[sender.element as usize],
+                };
                 let area = mesh.area(sender.element) / if sender.corner.is_some() { 3.0 } else { 1.0 };
                 let mut random = Random::new(settings.seed ^ 0x1ea, number as u64);
                 for &barycentric in &places {

@@ -113,11 +113,6 @@ impl Optics {
         Self { any_passes: passes.contains(&true), optical, passes, mirrors, bounces: bounces + 1 }
     }
 
-    /// Whether anything in the scene bends light, or reflects it other than diffusely.
-    pub(crate) fn any_optical(&self) -> bool {
-        self.optical.contains(&true)
-    }
-
     /// What thin walls and half-covered surfaces leave of light between two points that are lifted off their surfaces;
     /// zero where something solid stands between.
     pub(crate) fn transmittance(&self, bvh: &SceneBvh, from: DVec3, to: DVec3) -> Vec3 {

@@ -205,6 +205,32 @@ impl<'s> SceneBvh<'s> {
         !self.tree.ray_traverse_miss(cast, |r, id| self.distance(r, id, Sides::Both))
     }
 
+    /// Whether `chosen` holds for any triangle in boxes (lowest and highest corner) for which `entered` holds [m].
+    pub fn any_triangle(&self, entered: impl Fn(DVec3, DVec3) -> bool, chosen: impl Fn(u32) -> bool) -> bool {
+        if self.leaves.is_empty() {
+            return false;
+        }
+        let mut open = vec![0u32];
+        while let Some(index) = open.pop() {
+            let node = &self.tree.nodes[index as usize];
+            for child in (0..8).filter(|&child| !node.is_child_empty(child)) {
+                let bounds = node.child_aabb(child);
+                if !entered(bounds.min.as_dvec3() / self.scale, bounds.max.as_dvec3() / self.scale) {
+                    continue;
+                }
+                if node.is_leaf(child) {
+                    let (first, count) = node.child_primitives(child);
+                    if (first..first + count).any(|leaf| chosen(self.leaves[leaf as usize].index)) {
+                        return true;
+                    }
+                } else {
+                    open.push(node.child_node_index(child));
+                }
+            }
+        }
+        false
+    }
+
     fn traversal(&self, origin: DVec3, direction: DVec3, min: f64, max: f64) -> ray::Ray {
         // Adding zero turns −0 into 0: obvhs takes −0 for a negative slope in one place and for none in another, and
         // loses the boxes that it then enters from behind.
