@@ -2,20 +2,25 @@
 
 use super::rooms::Room;
 use super::*;
+use crate::random::Random;
+use crate::scene::bvh::Ray;
 use crate::scene::{Material, Sides};
+use glam::DVec3;
+use std::f64::consts::PI;
 
 fn lit<'s>(bvh: &'s SceneBvh<'s>, settings: IlluminationSettings) -> Illumination<'s> {
     Illumination::new(bvh, settings, &Progress::new()).unwrap()
 }
 
-/// Direct radiance of a floor of albedo one at a point, as a ray from above it finds it.
+/// Radiance of a floor of albedo one at a point, as a ray from above it finds it.
 fn floor_at(light: &Illumination, x: f64, height: f64, z: f64) -> Vec3 {
     let ray = Ray { origin: DVec3::new(x, height, z), direction: DVec3::NEG_Y };
     let hit = light.bvh().nearest(&ray, 0.0, Sides::Front).unwrap();
     let surface = Surface::at(light.bvh().scene(), &hit, 0.0);
-    light.direct(
+    light.radiance(
         &hit,
         &surface,
+        1,
         &mut Random::new(7, hit.position.x.to_bits() ^ hit.position.z.to_bits().rotate_left(17)),
     )
 }

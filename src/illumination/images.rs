@@ -411,7 +411,7 @@ mod tests {
         let light = Illumination::new(&bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
         let ray = Ray { origin: DVec3::new(x, 0.05, z), direction: DVec3::NEG_Y };
         let hit = bvh.nearest(&ray, 0.0, Sides::Front).unwrap();
-        light.radiance(&hit, &Surface::at(scene, &hit, 0.0), &mut Random::new(3, 3))
+        light.radiance(&hit, &Surface::at(scene, &hit, 0.0), 1, &mut Random::new(3, 3))
     }
 
     /// A black-and-white floor of albedo one, a lamp that looks down at height 1, and whatever else is put in.

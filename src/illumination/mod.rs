@@ -28,6 +28,7 @@ mod radiosity;
 #[cfg(test)]
 pub(crate) mod rooms;
 mod sampling;
+mod shading;
 mod shaft;
 pub mod surface;
 #[cfg(test)]
@@ -40,18 +41,16 @@ pub use surface::Surface;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::random::Random;
-use crate::scene::bvh::{Hit, Ray, SceneBvh};
+use crate::scene::bvh::SceneBvh;
 use caustics::Caustics;
 use elements::{Elements, Fineness, Senders};
-use emitters::{Clear, Emitters, ShadowRays};
-use glam::{DVec3, Vec3};
+use emitters::{Clear, Emitters};
+use glam::Vec3;
 use images::{Around, Images};
 use patches::Patches;
 use paths::Optics;
-use radiosity::{End, Surroundings, Transport};
+use radiosity::{Surroundings, Transport};
 use rayon::prelude::*;
-#[cfg(test)]
-use std::f64::consts::PI;
 use std::time::Instant;
 
 /// How light is computed.
@@ -152,8 +151,6 @@ pub struct IlluminationReport {
 const MOST_GATHERING_RAYS: usize = 24_000_000;
 /// Vertices at which images of lamps are compared.
 const MOST_PLACES: usize = 400;
-/// Rays with which a point gathers where its element is cut through.
-const DOUBT_SIDE: usize = 16;
 
 /// A lit scene.
 pub struct Illumination<'s> {
@@ -271,65 +268,6 @@ impl<'s> Illumination<'s> {
     /// Whether nothing shines at all: neither a sampled emitter, nor a weak one, nor a punctual light.
     pub fn is_dark(&self) -> bool {
         self.emitters.is_dark() && self.leaving.iter().all(|b| b.max_element() <= 0.0)
-    }
-
-    /// Radiance that a surface's diffuse part and its emission send out at a hit [W/(m² sr)].
-    pub fn radiance(&self, hit: &Hit, surface: &Surface, random: &mut Random) -> Vec3 {
-        if !surface.is_diffuse() {
-            return surface.emission;
-        }
-        surface.emission + surface.albedo * (self.direct(hit, surface, random) + self.indirect(hit, surface, random))
-    }
-
-    /// Irradiance over π that comes from lamps, straight or by way of mirrors and glass.
-    pub fn direct(&self, hit: &Hit, surface: &Surface, random: &mut Random) -> Vec3 {
-        let point = surface.position + surface.facing * self.bvh.offset();
-        let element = self.mesh.locate(hit.triangle, hit.front, hit.barycentric.map(|b| b as f32));
-        let clear = element.map_or(0, |(element, _)| self.clear[element as usize]);
-        let rays = ShadowRays { first: self.settings.shadow_rays, penumbra: self.settings.penumbra_rays, clear };
-        let straight = self.emitters.light(self.bvh, &self.optics, point, surface.normal, rays, random);
-        let rays = ShadowRays { first: rays.first.div_ceil(2), penumbra: rays.penumbra / 2, ..rays };
-        let mirrored = self.images.strong(self.around(), point, surface.normal, rays, random);
-        straight + mirrored + self.caustics.light(surface.position, surface.facing)
-    }
-
-    /// Irradiance over π that comes by way of other surfaces.
-    pub fn indirect(&self, hit: &Hit, surface: &Surface, random: &mut Random) -> Vec3 {
-        if let Some(rays) = self.settings.final_gather {
-            let point = surface.position + surface.facing * self.bvh.offset();
-            let images = self.images.weak(self.around(), point, surface.normal, random);
-            return images + self.gather(surface, f64::from(rays).sqrt().ceil() as usize, random);
-        }
-        let barycentric = hit.barycentric.map(|b| b as f32);
-        let Some((element, weights)) = self.mesh.locate(hit.triangle, hit.front, barycentric) else {
-            return Vec3::ZERO;
-        };
-        let element = &self.mesh.elements[element as usize];
-        if element.doubtful {
-            let point = surface.position + surface.facing * self.bvh.offset();
-            let images = self.images.weak(self.around(), point, surface.normal, random);
-            return images + self.gather(surface, DOUBT_SIDE, random);
-        }
-        element.corners.iter().zip(weights).map(|(&v, w)| self.irradiance[v as usize] * w).sum()
-    }
-
-    /// Indirect irradiance over π, gathered with `side`² rays from the mesh's radiosity.
-    fn gather(&self, surface: &Surface, side: usize, random: &mut Random) -> Vec3 {
-        let origin = surface.position + surface.facing * self.bvh.offset();
-        let directions: Vec<DVec3> = sampling::hemisphere(surface.normal, side, random).collect();
-        // `hemisphere` works on a copy of the stream; step past what it has used.
-        *random = Random::new(random.bits(), 1);
-        let around = self.surroundings();
-        let (mut sum, mut rays) = (Vec3::ZERO, 0.0f32);
-        for direction in directions {
-            if direction.dot(surface.facing) > 0.0 {
-                rays += 1.0;
-                if let (End::Sender(sender), weight) = around.follow(Ray { origin, direction }, random) {
-                    sum += self.leaving[sender as usize] * weight;
-                }
-            }
-        }
-        sum * (self.settings.form_factor.scale() as f32 / rays.max(1.0))
     }
 
     fn surroundings(&self) -> Surroundings<'_> {

@@ -2,7 +2,11 @@
 
 use super::rooms::Room;
 use super::*;
+use crate::random::Random;
+use crate::scene::bvh::Ray;
 use crate::scene::{LightKind, Material, PunctualLight, Scene, Sides};
+use glam::DVec3;
+use std::f64::consts::PI;
 
 fn lit<'s>(bvh: &'s SceneBvh<'s>, settings: IlluminationSettings) -> Illumination<'s> {
     Illumination::new(bvh, settings, &Progress::new()).unwrap()
@@ -12,7 +16,7 @@ fn lit<'s>(bvh: &'s SceneBvh<'s>, settings: IlluminationSettings) -> Illuminatio
 fn seen(light: &Illumination, origin: DVec3, direction: DVec3) -> Vec3 {
     let hit = light.bvh().nearest(&Ray { origin, direction: direction.normalize() }, 0.0, Sides::Front).unwrap();
     let surface = Surface::at(light.bvh().scene(), &hit, 0.0);
-    light.radiance(&hit, &surface, &mut Random::new(9, hit.distance.to_bits()))
+    light.radiance(&hit, &surface, 1, &mut Random::new(9, hit.distance.to_bits()))
 }
 
 fn close(value: Vec3, expected: [f64; 3], tolerance: f64) {

@@ -75,6 +75,8 @@ struct Branch {
     leaving: Option<DVec3>,
     wave: Wavefront,
     group: Option<u16>,
+    /// Over how many looks like this the mean is taken.
+    share: u32,
 }
 
 impl Eye<'_> {
@@ -95,7 +97,9 @@ impl Eye<'_> {
     }
 
     /// Follows the ray through a place of the picture.
-    pub(crate) fn look(&self, column: f64, row: f64, random: &mut Random) -> Seen {
+    ///
+    /// `share` is the number of looks whose mean is taken.
+    pub(crate) fn look(&self, column: f64, row: f64, share: u32, random: &mut Random) -> Seen {
         let ray = self.ray(column, row);
         let mut seen = Seen::nothing();
         let mut ends: Vec<End> = Vec::new();
@@ -108,6 +112,7 @@ impl Eye<'_> {
             leaving: None,
             wave: Wavefront::new(ray.direction),
             group: None,
+            share,
         };
         let mut open = vec![first];
         while let Some(branch) = open.pop() {
@@ -154,7 +159,7 @@ impl Eye<'_> {
             branch.weight *= surface.coverage;
         }
         if surface.is_diffuse() || surface.emission.max_element() > 0.0 {
-            let radiance = branch.weight * self.light.radiance(&hit, &surface, random);
+            let radiance = branch.weight * self.light.radiance(&hit, &surface, branch.share, random);
             let group = branch.group.unwrap_or_else(|| next(groups));
             let depth = self.depth(&branch);
             seen.radiance += radiance;
@@ -187,6 +192,7 @@ impl Eye<'_> {
             let half = ways.half;
             let mut mirrored = Branch {
                 bounces: branch.bounces + 1,
+                share: branch.share * lobe,
                 group: groups[0],
                 ..own(share * ways.reflectance, Ray { origin: surface.position, direction: ways.mirrored })
             };
@@ -194,6 +200,7 @@ impl Eye<'_> {
             push(open, mirrored, random);
             let mut through = Branch {
                 bounces: branch.bounces + 1,
+                share: branch.share * lobe,
                 group: groups[1],
                 ..own(share * ways.transmittance, Ray { origin: surface.position, direction: ways.through })
             };

@@ -31,7 +31,7 @@ fn agrees(room: &Room, camera: &Camera, squares: &[[f64; 2]], paths: u32, tolera
             .map(|i| {
                 let mut random = Random::new(1, u64::from(i));
                 let (x, y) = place(i, &mut random);
-                eye.look(x, y, &mut random).radiance
+                eye.look(x, y, n * n, &mut random).radiance
             })
             .sum::<Vec3>()
             / (n * n) as f32;

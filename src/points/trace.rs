@@ -124,7 +124,7 @@ pub fn trace(light: &Illumination, camera: &Camera, settings: &TraceSettings, pr
             }
             let mut random = Random::new(settings.seed, u64::from(pixel));
             let (column, row) = (f64::from(pixel % width) + 0.5, f64::from(pixel / width) + 0.5);
-            if progress.stopped() { Seen::nothing() } else { eye.look(column, row, &mut random) }
+            if progress.stopped() { Seen::nothing() } else { eye.look(column, row, 1, &mut random) }
         })
         .collect();
     progress.check()?;
@@ -142,7 +142,8 @@ pub fn trace(light: &Illumination, camera: &Camera, settings: &TraceSettings, pr
                 .map(|cell| {
                     let x = (f64::from(cell % side) + random.uniform()) / f64::from(side);
                     let y = (f64::from(cell / side) + random.uniform()) / f64::from(side);
-                    eye.look(f64::from(pixel % width) + x, f64::from(pixel / width) + y, &mut random).radiance
+                    eye.look(f64::from(pixel % width) + x, f64::from(pixel / width) + y, side * side, &mut random)
+                        .radiance
                 })
                 .sum();
             (sum / (side * side) as f32).to_array()
