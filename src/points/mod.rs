@@ -1,5 +1,6 @@
 //! Point sources: what the scene's light becomes before it is a wave.
 
+pub mod colour;
 pub mod images;
 pub mod placement;
 pub mod ply;
