@@ -1,6 +1,8 @@
 //! Point sources: what the scene's light becomes before it is a wave.
 
+pub mod budget;
 pub mod colour;
+pub mod exposure;
 pub mod images;
 pub mod placement;
 pub mod ply;

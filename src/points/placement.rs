@@ -199,10 +199,7 @@ pub fn place(points: &[WorldPoint], placing: &Placing, phase: Phase, panel: &Gri
         let phase = match phase {
             Phase::Zero => 0.0,
             Phase::Random { seed } => Random::new(seed, index as u64).phase(),
-            Phase::Path => {
-                let turns = -distance / wavelength;
-                std::f64::consts::TAU * (turns - turns.floor())
-            }
+            Phase::Path => path_phase(distance, wavelength),
         };
         rgb.push(point.radiance.map(amplitude));
         placed.cloud.points.push(PointSource {
@@ -214,6 +211,13 @@ pub fn place(points: &[WorldPoint], placing: &Placing, phase: Phase, panel: &Gri
     placed.cloud.rgb = Some(rgb);
     placed.beyond_cone_light = if all_light > 0.0 { lost_light / all_light } else { 0.0 };
     placed
+}
+
+/// −k·distance, reduced to 0 … 2π [rad], for a vacuum wavelength [m]: the phase with which a wave from that distance [m]
+/// arrives in step.
+pub fn path_phase(distance: f64, wavelength: f64) -> f64 {
+    let turns = -distance / wavelength;
+    std::f64::consts::TAU * (turns - turns.floor())
 }
 
 impl Placing {
