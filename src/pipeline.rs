@@ -9,13 +9,17 @@ use crate::hologram::{self, Computed, HologramSettings};
 use crate::illumination::{Illumination, IlluminationReport, IlluminationSettings};
 use crate::panel::simulated::{self, Simulation};
 use crate::panel::{Frame, PanelProfile};
-use crate::points::placement::{Phase, Placing, WorldPoint};
-use crate::points::trace::{self, TraceReport, TraceSettings};
-use crate::points::{self, Channel, Placed, Placement, PointCloud};
+use crate::points::budget::{Budget, Limit, Rays, Resolution};
+use crate::points::colour::{Gamut, Lasers};
+use crate::points::exposure::{Exposed, Exposure};
+use crate::points::placement::{self, Phase, Placing, WorldPoint};
+use crate::points::trace::{self, TraceReport, TraceSettings, Traced};
+use crate::points::{self, Channel, Placed, Placement, PointCloud, PointSource};
 use crate::progress::Progress;
 use crate::propagation::Aperture;
 use crate::reconstruction::ViewSettings;
 use crate::scene::{SceneBvh, gltf};
+use glam::DVec3;
 use std::path::Path;
 
 /// How a scene becomes points.
@@ -27,6 +31,8 @@ pub struct SceneSettings {
     pub illumination: IlluminationSettings,
     /// Rays.
     pub trace: TraceSettings,
+    /// How many points; then only the shape of the rays' grid is taken from `trace`. `None` casts its rays as they are.
+    pub points: Option<Budget>,
     /// Where the scene stands before the panel.
     pub placement: Placement,
     /// Initial phase of the points.
@@ -35,27 +41,13 @@ pub struct SceneSettings {
     pub exposure: Exposure,
 }
 
-/// What a hologram does with light that a picture shows as white and brighter.
-///
-/// A lamp is a hundred times brighter than the wall that it lights. Kept so, it takes most of the panel's light and
-/// its whole dynamic range; a photographer lets it burn out.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Exposure {
-    /// Radiance is kept as it is.
-    #[default]
-    Full,
-    /// Luminance is clipped at [`white_level`] of the picture, colour kept; what is lost is reported.
-    Auto,
-    /// Luminance is clipped at this value [W/(m² sr)].
-    White(f32),
-}
-
 impl Default for SceneSettings {
     fn default() -> Self {
         Self {
             load: gltf::LoadOptions::default(),
             illumination: IlluminationSettings::default(),
             trace: TraceSettings::default(),
+            points: None,
             placement: Placement::default(),
             phase: Phase::Random { seed: 1 },
             exposure: Exposure::Full,
@@ -76,10 +68,10 @@ pub struct Lit {
     pub illumination: IlluminationReport,
     /// What the rays took.
     pub trace: TraceReport,
-    /// Luminance that was taken as white, if light beyond it was clipped.
-    pub white: Option<f32>,
-    /// Part of the light (0 to 1) that was clipped.
-    pub clipped_light: f64,
+    /// What a budget of points chose, if there was one.
+    pub rays: Option<Rays>,
+    /// White, and what is brighter.
+    pub exposed: Exposed,
     /// What had to be assumed.
     pub warnings: Vec<String>,
 }
@@ -116,7 +108,11 @@ pub fn light(
     let placing = settings.placement.prepare(&loaded.scene, camera, aspect, panel)?;
     let bvh = SceneBvh::new(&loaded.scene);
     let illumination = Illumination::new(&bvh, settings.illumination, progress)?;
-    let traced = trace::trace(&illumination, &placing.camera, &settings.trace, progress)?;
+    let cast = |settings: &TraceSettings| trace::trace(&illumination, &placing.camera, settings, progress);
+    let (traced, rays) = match settings.points {
+        None => (cast(&settings.trace)?, None),
+        Some(budget) => within_budget(budget, &settings.trace, cast, &placing, panel, wavelength)?,
+    };
     if traced.points.is_empty() {
         let what = if illumination.is_dark() {
             "its lights give no light; raise their intensity or emission"
@@ -125,49 +121,62 @@ pub fn light(
         };
         return Err(Error::input(scene, what));
     }
-    let mut world: Vec<WorldPoint> =
-        traced.points.iter().map(|p| WorldPoint { position: p.position, radiance: p.radiance }).collect();
-    let white = match settings.exposure {
-        Exposure::Full => None,
-        Exposure::Auto => Some(white_level(&traced.picture)),
-        Exposure::White(white) if white.is_finite() && white > 0.0 => Some(white),
-        Exposure::White(white) => return Err(Error::parameter("white", format!("{white} must be greater than zero"))),
-    };
-    let clipped_light = white.map_or(0.0, |white| expose(&mut world, white));
+    let mut world = world_points(&traced);
+    let exposed = settings.exposure.apply(&mut world, &traced.picture)?;
     let placed = points::place(&world, &placing, settings.phase, panel, wavelength);
     let view = SceneView::new(&traced, &placed, placing);
     let warnings = loaded.warnings.iter().map(ToString::to_string).collect();
-    Ok(Lit {
-        placed,
-        world,
-        view,
-        illumination: *illumination.report(),
-        trace: traced.report,
-        white,
-        clipped_light,
-        warnings,
-    })
+    Ok(Lit { placed, world, view, illumination: *illumination.report(), trace: traced.report, rays, exposed, warnings })
 }
 
-/// Luminance that pictures of a scene show as white: a quarter above what 97 % of its lit pixels do not pass.
-pub fn white_level(picture: &[[f32; 3]]) -> f32 {
-    let mut lit: Vec<f32> = picture.iter().map(|rgb| Channel::Luminance.of(*rgb)).filter(|l| *l > 0.0).collect();
-    lit.sort_by(f32::total_cmp);
-    lit.get(lit.len() * 97 / 100).map_or(1.0, |level| 1.25 * level)
+fn world_points(traced: &Traced) -> Vec<WorldPoint> {
+    traced.points.iter().map(|p| WorldPoint { position: p.position, radiance: p.radiance }).collect()
 }
 
-/// Clips the points' luminance at `white`, hue kept; returns the part of the light that is lost.
-fn expose(points: &mut [WorldPoint], white: f32) -> f64 {
-    let (mut all, mut lost) = (0.0, 0.0);
-    for point in points {
-        let luminance = Channel::Luminance.of(point.radiance);
-        all += f64::from(luminance);
-        if luminance > white {
-            lost += f64::from(luminance - white);
-            point.radiance = point.radiance.map(|c| c * (white / luminance));
+/// Traces a scene into a number of points: a few rays tell what share of them becomes points, and how deep they stand.
+fn within_budget(
+    budget: Budget,
+    settings: &TraceSettings,
+    cast: impl Fn(&TraceSettings) -> Result<Traced>,
+    placing: &Placing,
+    panel: &Grid,
+    wavelength: f64,
+) -> Result<(Traced, Option<Rays>)> {
+    /// Rays of the first look: the share of a shape's area on such a grid is right to a few tenths of a per cent.
+    const PILOT: f64 = 10_000.0;
+    /// What a number of points may be off.
+    const NEAR: f64 = 0.03;
+    let shape = [settings.width, settings.height];
+    let scale = (PILOT / (f64::from(shape[0]) * f64::from(shape[1]))).sqrt().min(1.0);
+    let [width, height] = shape.map(|side| (f64::from(side) * scale).ceil().max(1.0) as u32);
+    let pilot = cast(&TraceSettings { width, height, edge_rays: 1, ..*settings })?;
+    let share = |traced: &Traced| traced.points.len() as f64 / (f64::from(traced.width) * f64::from(traced.height));
+    let placed = points::place(&world_points(&pilot), placing, Phase::Zero, panel, wavelength);
+    let Some(depths) = placed.cloud.depth_range() else { return Ok((pilot, None)) };
+    let resolution = Resolution::new(placing, depths, panel, wavelength);
+    let mut rays = budget.rays(shape, share(&pilot), resolution)?;
+    let mut best: Option<(f64, Traced, Rays)> = None;
+    // Fine structure may fool the first look; the second knows the finer grid's share.
+    for _ in 0..3 {
+        let traced = cast(&TraceSettings { width: rays.size[0], height: rays.size[1], ..*settings })?;
+        let off = match (budget, rays.limit) {
+            (Budget::Points(count), Limit::Budget) => (traced.points.len() as f64 / count as f64).ln().abs(),
+            _ => 0.0,
+        };
+        let next = if off > NEAR && !traced.points.is_empty() {
+            Some(budget.rays(shape, share(&traced), resolution)?).filter(|next| next.size != rays.size)
+        } else {
+            None
+        };
+        if best.as_ref().is_none_or(|(least, ..)| off < *least) {
+            best = Some((off, traced, rays));
+        }
+        match next {
+            Some(next) => rays = next,
+            None => break,
         }
     }
-    if all > 0.0 { lost / all } else { 0.0 }
+    Ok(best.map_or((pilot, None), |(_, traced, rays)| (traced, Some(rays))))
 }
 
 /// Points → field on the panel, by the engine that the planner chooses.
@@ -182,6 +191,41 @@ pub fn field(
     let points = cloud.channel(channel);
     let plan = hologram::plan(&points, panel, wavelength, settings)?;
     hologram::compute(&points, panel, wavelength, &plan, progress)
+}
+
+/// A cloud's fields in the light of three lasers.
+#[derive(Clone, Debug)]
+pub struct ColorFields {
+    /// Fields in red, green and blue; a laser without any light has none.
+    pub computed: [Option<Computed>; 3],
+    /// Light that the lasers cannot make.
+    pub gamut: Gamut,
+}
+
+/// Points → three fields on the panel, one for each laser. Where phases are those of paths to an eye, it stands at
+/// `path_eye`: they differ from laser to laser.
+pub fn color_fields(
+    cloud: &PointCloud,
+    lasers: &Lasers,
+    path_eye: Option<DVec3>,
+    panel: &Grid,
+    settings: &HologramSettings,
+    progress: &Progress,
+) -> Result<ColorFields> {
+    let (each, gamut) = lasers.points(cloud);
+    let one = |(mut points, wavelength): (Vec<PointSource>, f64)| {
+        if let Some(eye) = path_eye {
+            points.iter_mut().for_each(|p| p.phase = placement::path_phase((eye - p.position).length(), wavelength));
+        }
+        if points.iter().all(|p| p.amplitude == 0.0) {
+            return Ok(None);
+        }
+        let plan = hologram::plan(&points, panel, wavelength, settings)?;
+        hologram::compute(&points, panel, wavelength, &plan, progress).map(Some)
+    };
+    let [red, green, blue] = each;
+    let [long, middle, short] = lasers.wavelengths();
+    Ok(ColorFields { computed: [one((red, long))?, one((green, middle))?, one((blue, short))?], gamut })
 }
 
 /// Field → frame of drive levels for a panel.

@@ -158,6 +158,25 @@ fn bad_profiles_and_flags_end_in_one_line() {
     refused(f, &["points", &scene("cornell.gltf"), "--rays", "0x500"], "500x500");
     refused(f, &["points", &scene("cornell.gltf"), "--camera", "nobody"], "nobody");
     refused(f, &["points", &scene("cornell.gltf"), "--near", "200mm", "--far", "100mm"], "far");
+    for (wavelengths, expected) in [
+        ("638nm,520nm", "three wavelengths"),
+        ("638,520,450", "unit"),
+        ("638nm,520nm,1064nm", "visible"),
+        ("638nm,620nm,610nm", "white"),
+        ("panel", "panel generic names 1"),
+    ] {
+        refused(f, &["compute", "p.ply", "--wavelengths", wavelengths], expected);
+        refused(f, &["show", "p.ply", "--wavelengths", wavelengths], expected);
+    }
+    let three = "638nm,520nm,450nm";
+    refused(f, &["compute", "p.ply", "--wavelengths", three, "--wavelength", "532nm"], "--wavelength");
+    refused(f, &["compute", "p.ply", "--wavelengths", three, "--channel", "red"], "--channel");
+    refused(f, &["compute", "p.ply", "--wavelengths", three, "--panel", "hamamatsu-x15213"], "450nm");
+    refused(f, &["compute", "p.ply", "--points", "1000"], "points");
+    for wrong in ["0", "-5", "many"] {
+        refused(f, &["points", &scene("cornell.gltf"), &format!("--points={wrong}")], "number of points");
+    }
+    refused(f, &["points", &scene("cornell.gltf"), "--final-gather=0"], "--final-gather");
     refused(f, &["reconstruct", "frame.png"], "--distance");
     refused(f, &["frobnicate"], "frobnicate");
     refused(f, &[], "command");
@@ -210,6 +229,47 @@ fn reports_are_json_and_help_has_examples() {
     }
 }
 
+#[test]
+fn reports_state_exposure_budget_and_gamut() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    let told = |arguments: &[&str]| -> serde_json::Value {
+        let out = holodrive(f, arguments);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        serde_json::from_slice(&out.stdout).expect("JSON")
+    };
+    let chart = scene("depth-chart.gltf");
+    let report = told(&["points", &chart, "--points", "3000", "--wavelengths", "450nm,638nm,520nm", "--json"]);
+    let count = report["points"].as_u64().expect("points");
+    assert!(count.abs_diff(3000) < 150, "{count}");
+    assert_eq!(report["budget"]["limit"], "budget");
+    assert!(report["budget"]["resolution"]["eye"][0].as_f64().is_some_and(|cells| (cells - 49.5).abs() < 0.1));
+    assert!(report["exposure"]["white"].as_f64().is_some_and(|white| white > 0.0));
+    assert_eq!(report["exposure"]["clips"], false);
+    assert_eq!(report["clipped_points"], 0);
+    assert_eq!(report["gamut"]["outside_points"], 0);
+    let near = |value: &serde_json::Value, wavelength: f64| {
+        value.as_f64().is_some_and(|found| (found / wavelength - 1.0).abs() < 1e-9)
+    };
+    assert!(near(&report["wavelengths"][0], 638e-9), "by falling wavelength");
+    // Half of the chart's own white is clipped away.
+    let white = format!("{}", 0.5 * report["exposure"]["brightest"].as_f64().expect("brightest"));
+    let report = told(&["points", &chart, "--points", "1000", "--white", &white, "--json", "--final-gather=16"]);
+    assert!(report["clipped_light"].as_f64().is_some_and(|part| part > 0.1 && part < 0.6), "{report}");
+    assert!(report["clipped_points"].as_u64().is_some_and(|points| points > 0));
+    // Three lasers, three fields at their own wavelengths.
+    let fields = ["compute", "points.ply", "--wavelengths", "638nm,520nm,450nm", "-o", "f.npy", "--json"];
+    let report = told(&fields);
+    for (name, wavelength) in [("red", 638e-9), ("green", 520e-9), ("blue", 450e-9)] {
+        assert!(near(&report[name]["wavelength"], wavelength));
+        let text = fs::read_to_string(f.join(format!("f-{name}.npy.json"))).expect("metadata");
+        let metadata: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        assert!(near(&metadata["wavelength"], wavelength));
+        assert!(metadata["origin"].as_str().is_some_and(|o| o.contains(&format!("{name} of three lasers"))), "{text}");
+    }
+    assert!(!f.join("f.npy").exists());
+}
+
 /// Commands in the README's `sh` blocks, in their order.
 fn readme_commands() -> Vec<String> {
     let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md");
@@ -249,6 +309,9 @@ fn every_command_of_the_readme_runs() {
         };
         let out = holodrive(f, arguments);
         assert!(out.status.success(), "{command}: {}", String::from_utf8_lossy(&out.stderr));
+    }
+    for name in ["frame-red.png", "frame-green.png", "frame-blue.png", "field-red.npy", "reconstruction-sharp.png"] {
+        assert!(f.join("colour").join(name).is_file(), "{name} is missing: {:?}", names(&f.join("colour")));
     }
     for name in ["traced.png", "points.ply", "field.npy", "frame.png", "report.json", "reconstruction-sharp.png"] {
         assert!(

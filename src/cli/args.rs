@@ -6,6 +6,10 @@ use holodrive::encode::Encoding;
 use holodrive::units;
 use std::path::PathBuf;
 
+pub(crate) use super::scene_args::{
+    ColorArgs, DepthArg, FormFactorArg, PhaseArg, PlacementArg, PlacementArgs, SceneArgs, Wavelengths, White,
+};
+
 const EXIT_CODES: &str = "\
 Exit codes: 0 done; 2 wrong flags, bad input, or a file or display that refused (one line says what, where and what to do; \
 nothing is written under a final name); 130 interrupted.";
@@ -27,12 +31,12 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Light a scene and trace it into point sources.
     #[command(
-        after_help = "Examples:\n  holodrive points scenes/cornell.gltf -o points.ply\n  holodrive points room.glb -o world.ply --frame world --picture traced.npy --rays 800x600"
+        after_help = "Examples:\n  holodrive points scenes/cornell.gltf -o points.ply\n  holodrive points room.glb -o world.ply --frame world --picture traced.npy --rays 800x600\n  holodrive points room.glb --points 100000 -o points.ply"
     )]
     Points(PointsArgs),
     /// Compute the field of a scene, point cloud, or picture with depth on the panel.
     #[command(
-        after_help = "Examples:\n  holodrive compute points.ply -o field.npy\n  holodrive compute rgb.png+depth.png --panel holoeye-pluto-2.1 --wavelength 532nm -o field.npy"
+        after_help = "Examples:\n  holodrive compute points.ply -o field.npy\n  holodrive compute rgb.png+depth.png --panel holoeye-pluto-2.1 --wavelength 532nm -o field.npy\n  holodrive compute points.ply --wavelengths 638nm,520nm,450nm -o field.npy"
     )]
     Compute(ComputeArgs),
     /// Carry a field from its plane to another.
@@ -50,7 +54,7 @@ pub(crate) enum Command {
     Reconstruct(ReconstructArgs),
     /// The whole way: scene, points, field or frame → pictures on the simulated panel, or light on a real one.
     #[command(
-        after_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO"
+        after_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show scenes/cornell.gltf --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO"
     )]
     Show(ShowArgs),
     /// List the monitors, and which panel profile fits each.
@@ -71,106 +75,6 @@ pub(crate) struct PanelArgs {
     pub(crate) wavelength: Option<f64>,
 }
 
-/// How a scene is lit and traced.
-#[derive(Clone, Debug, Args)]
-pub(crate) struct SceneArgs {
-    /// Rays across and down.
-    #[arg(long, default_value = "500x500", value_parser = size, value_name = "WxH")]
-    pub(crate) rays: (usize, usize),
-    /// Camera of the scene, by name or number [default: the first].
-    #[arg(long, value_name = "NAME")]
-    pub(crate) camera: Option<String>,
-    /// Animation clip, by name or number.
-    #[arg(long, value_name = "NAME")]
-    pub(crate) animation: Option<String>,
-    /// Time in the animation [s].
-    #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
-    pub(crate) time: f64,
-    /// Form factors: exact (1/π, polygons), or the seed paper's eq. (1) for comparison (half of the light is lost).
-    #[arg(long, value_enum, default_value_t = FormFactorArg::Exact)]
-    pub(crate) form_factor: FormFactorArg,
-    /// Most mirror reflections along a ray.
-    #[arg(long, default_value_t = 8, value_name = "N")]
-    pub(crate) bounces: u32,
-    /// Seed of all random numbers.
-    #[arg(long, default_value_t = 1, value_name = "N")]
-    pub(crate) seed: u64,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum FormFactorArg {
-    Exact,
-    Paper,
-}
-
-/// Where the scene stands before the panel.
-#[derive(Clone, Debug, Args)]
-pub(crate) struct PlacementArgs {
-    /// window: the camera's picture seen through the panel; model: the scene as a miniature.
-    #[arg(long, value_enum, default_value_t = PlacementArg::Window)]
-    pub(crate) placement: PlacementArg,
-    /// Distance of the viewer's eye in front of the panel.
-    #[arg(long, default_value = "600mm", value_parser = units::positive_length, value_name = "LENGTH")]
-    pub(crate) viewer: f64,
-    /// window: how far behind the panel the nearest point stands (negative: in front).
-    #[arg(long, default_value = "100mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
-    pub(crate) near: f64,
-    /// window: how far behind the panel the farthest point stands.
-    #[arg(long, default_value = "150mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
-    pub(crate) far: f64,
-    /// model: how far behind the panel the scene's middle stands (negative: in front).
-    #[arg(long, default_value = "150mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
-    pub(crate) distance: f64,
-    /// model: metres at the panel for one metre of the scene [default: fits the view].
-    #[arg(long, value_name = "FACTOR")]
-    pub(crate) scale: Option<f64>,
-    /// Initial phase of the points.
-    #[arg(long, value_enum, default_value_t = PhaseArg::Random)]
-    pub(crate) phase: PhaseArg,
-    /// Clip light brighter than white: auto (a quarter above what 97 % of the lit pixels do not pass), none, or a
-    /// radiance [default: none for `points`, auto otherwise].
-    #[arg(long, value_parser = white, value_name = "WHITE")]
-    pub(crate) white: Option<White>,
-    /// Depth map of a picture: which end of its gray scale is near.
-    #[arg(long, value_enum, default_value_t = DepthArg::WhiteNear)]
-    pub(crate) depth_scale: DepthArg,
-}
-
-/// What is clipped as white.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum White {
-    Auto,
-    None,
-    At(f32),
-}
-
-fn white(text: &str) -> Result<White, String> {
-    match text {
-        "auto" => Ok(White::Auto),
-        "none" => Ok(White::None),
-        value => value.parse().map(White::At).map_err(|_| format!("`{value}` is not auto, none or a radiance")),
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum PlacementArg {
-    Window,
-    Model,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum PhaseArg {
-    Zero,
-    Random,
-    Path,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum DepthArg {
-    WhiteNear,
-    BlackNear,
-}
-
 /// Which light of a coloured cloud makes the hologram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ChannelArg {
@@ -187,7 +91,7 @@ pub(crate) struct HologramArgs {
     #[arg(long, default_value_t = 1e-3, value_name = "ERROR")]
     pub(crate) error: f64,
     /// Which light of a coloured cloud.
-    #[arg(long, value_enum, default_value_t = ChannelArg::Luminance)]
+    #[arg(long, value_enum, default_value_t = ChannelArg::Luminance, conflicts_with = "wavelengths")]
     pub(crate) channel: ChannelArg,
 }
 
@@ -227,6 +131,8 @@ pub(crate) struct PointsArgs {
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
     #[command(flatten)]
+    pub(crate) color: ColorArgs,
+    #[command(flatten)]
     pub(crate) light: SceneArgs,
     #[command(flatten)]
     pub(crate) placement: PlacementArgs,
@@ -241,6 +147,8 @@ pub(crate) struct ComputeArgs {
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
+    #[command(flatten)]
+    pub(crate) color: ColorArgs,
     #[command(flatten)]
     pub(crate) light: SceneArgs,
     #[command(flatten)]
@@ -386,6 +294,8 @@ pub(crate) struct ShowArgs {
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
     #[command(flatten)]
+    pub(crate) color: ColorArgs,
+    #[command(flatten)]
     pub(crate) light: SceneArgs,
     #[command(flatten)]
     pub(crate) placement: PlacementArgs,
@@ -422,7 +332,7 @@ pub(crate) struct DoctorArgs {
     pub(crate) output: Option<PathBuf>,
 }
 
-fn size(text: &str) -> Result<(usize, usize), String> {
+pub(super) fn size(text: &str) -> Result<(usize, usize), String> {
     let wrong = || format!("`{text}` is not a size such as 500x500");
     let (width, height) = text.split_once(['x', '×']).ok_or_else(wrong)?;
     let side = |t: &str| t.trim().parse::<usize>().ok().filter(|n| (1..=65_536).contains(n));

@@ -4,7 +4,9 @@ use super::args::{
     ComputeArgs, EncodeArgs, EncodingArgs, FrameArg, KernelArg, PointsArgs, PropagateArgs, ReconstructArgs, White,
 };
 use super::bar::Bar;
-use super::load::{Input, Panel, channel, hologram_settings, input, load_points, panel, white_of};
+use super::colour;
+use super::light::report_gamut;
+use super::load::{Input, Panel, channel, hologram_settings, input, load_points, panel, panel_in_color};
 use super::report::{Report, seconds};
 use glam::DVec2;
 use holodrive::encode::{EncodeSettings, Encoding, Reference};
@@ -24,7 +26,7 @@ use std::time::Instant;
 
 pub(super) fn points(args: &PointsArgs) -> Result<Report> {
     let mut report = Report::new("points");
-    let panel = panel(&args.panel, &mut report)?;
+    let panel = panel_in_color(&args.panel, &args.color, &mut report)?;
     let Input::Scene(path) = input(&args.scene)? else {
         return Err(Error::input(&args.scene, "is no scene: .gltf or .glb"));
     };
@@ -36,6 +38,9 @@ pub(super) fn points(args: &PointsArgs) -> Result<Report> {
         &bar.progress,
         &mut report,
     )?;
+    if let Some(lasers) = &panel.lasers {
+        report_gamut(lasers, &lasers.points(&points.cloud).1, &mut report);
+    }
     let (mut cloud, mut metadata) = (points.cloud, points.metadata);
     let Some(lit) = points.lit else { return Err(Error::input(&args.scene, "is no scene")) };
     if args.frame == FrameArg::World {
@@ -59,7 +64,7 @@ pub(super) fn write_traced(path: &Path, lit: &Lit) -> Result<()> {
     let view = &lit.view;
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         let texts = [("Description", "traced picture, sRGB-coded linear radiance".to_string())];
-        write_rgb_png(path, view.width, view.height, &view.picture, white_of(lit), &texts)
+        write_rgb_png(path, view.width, view.height, &view.picture, lit.exposed.white, &texts)
     } else {
         npy::write_picture(path, view.width, view.height, &view.picture)
     }
@@ -90,10 +95,14 @@ pub(super) fn report_field(computed: &Computed, report: &mut Report) {
 
 pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
     let mut report = Report::new("compute");
-    let panel = panel(&args.panel, &mut report)?;
+    let panel = panel_in_color(&args.panel, &args.color, &mut report)?;
     let bar = Bar::new();
     let source = input(&args.input)?;
     let points = load_points(&source, (&args.light, &args.placement, White::Auto), &panel, &bar.progress, &mut report)?;
+    if let Some(lasers) = &panel.lasers {
+        colour::compute(args, (&panel, lasers), &points, &bar.progress, &mut report)?;
+        return Ok(report);
+    }
     let settings = hologram_settings(&args.hologram, args.engine);
     let channel = channel(&args.hologram);
     let computed = pipeline::field(&points.cloud, channel, &panel.grid, panel.wavelength, &settings, &bar.progress)?;

@@ -1,32 +1,37 @@
 //! What was typed, resolved: panel, settings, and the points of whatever input there is.
 
 use super::args::{
-    ChannelArg, DepthArg, EngineArg, FormFactorArg, HologramArgs, PanelArgs, PhaseArg, PlacementArg, PlacementArgs,
-    SceneArgs, White,
+    ChannelArg, ColorArgs, DepthArg, EngineArg, FormFactorArg, HologramArgs, PanelArgs, PhaseArg, PlacementArg,
+    PlacementArgs, SceneArgs, Wavelengths, White,
 };
-use super::report::{Report, count, seconds};
+use super::light::{report_cloud, report_light};
+use super::report::Report;
+use glam::DVec3;
 use holodrive::field::Grid;
 use holodrive::hologram::{HologramSettings, Method};
 use holodrive::illumination::{FormFactor, IlluminationSettings};
 use holodrive::panel::PanelProfile;
-use holodrive::pipeline::{self, Exposure, Lit, SceneSettings};
+use holodrive::pipeline::{self, Lit, SceneSettings};
+use holodrive::points::colour::Lasers;
+use holodrive::points::exposure::Exposure;
 use holodrive::points::placement::Phase;
 use holodrive::points::trace::TraceSettings;
 use holodrive::points::{Channel, Placement, PointCloud, images, ply};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::Picture;
 use holodrive::scene::gltf::{Choice, Clip, LoadOptions};
-use holodrive::units::show_length;
 use holodrive::{Error, Result};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// A panel profile with the wavelength that it is used at.
+/// A panel profile with the light that it is used in.
 pub(super) struct Panel {
     pub(super) profile: PanelProfile,
     pub(super) grid: Grid,
+    /// Of the hologram; the shortest of three lasers, whose cone is the narrowest.
     pub(super) wavelength: f64,
+    pub(super) lasers: Option<Lasers>,
 }
 
 pub(super) fn panel(args: &PanelArgs, report: &mut Report) -> Result<Panel> {
@@ -36,7 +41,29 @@ pub(super) fn panel(args: &PanelArgs, report: &mut Report) -> Result<Panel> {
     let grid = profile.grid()?;
     report.add("panel", profile.name.clone(), "");
     report.add("wavelength", wavelength, "");
-    Ok(Panel { profile, grid, wavelength })
+    Ok(Panel { profile, grid, wavelength, lasers: None })
+}
+
+/// The panel in the light of one laser, or of three where they were asked for.
+pub(super) fn panel_in_color(args: &PanelArgs, color: &ColorArgs, report: &mut Report) -> Result<Panel> {
+    let panel = panel(args, report)?;
+    let wavelengths = match color.wavelengths {
+        None => return Ok(panel),
+        Some(Wavelengths::Of(wavelengths)) => wavelengths,
+        Some(Wavelengths::Panel) => <[f64; 3]>::try_from(panel.profile.wavelengths.as_slice()).map_err(|_| {
+            let count = panel.profile.wavelengths.len();
+            let what = format!("panel {} names {count} wavelengths, not three; give them", panel.profile.name);
+            Error::parameter("wavelengths", what)
+        })?,
+    };
+    let lasers = Lasers::new(wavelengths)?;
+    let [_, _, shortest] = lasers.wavelengths();
+    // Whether the panel has a curve for each is found out before the work.
+    lasers.wavelengths().iter().try_for_each(|w| panel.profile.drive_curve(*w).map(drop))?;
+    report.add("wavelength", Value::Null, "");
+    report.add("wavelengths", lasers.wavelengths().to_vec(), "");
+    report.add("white_powers", lasers.white().to_vec(), "");
+    Ok(Panel { wavelength: shortest, lasers: Some(lasers), ..panel })
 }
 
 pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, default_white: White) -> SceneSettings {
@@ -54,6 +81,7 @@ pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, defau
         illumination: IlluminationSettings {
             form_factor,
             bounces: light.bounces,
+            final_gather: light.final_gather,
             seed: light.seed,
             ..IlluminationSettings::default()
         },
@@ -64,6 +92,7 @@ pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, defau
             seed: light.seed,
             ..TraceSettings::default()
         },
+        points: light.points,
         placement: placed_by(placement),
         phase: match placement.phase {
             PhaseArg::Zero => Phase::Zero,
@@ -149,6 +178,8 @@ pub(super) struct Points {
     pub(super) cloud: PointCloud,
     pub(super) metadata: ply::Metadata,
     pub(super) lit: Option<Lit>,
+    /// Eye to which the phases are those of paths, if they are.
+    pub(super) path_eye: Option<DVec3>,
 }
 
 /// Points of a scene, a cloud or a picture with depth.
@@ -161,6 +192,9 @@ pub(super) fn load_points(
 ) -> Result<Points> {
     let settings = scene_settings(light, placement, default_white);
     let begin = Instant::now();
+    if settings.points.is_some() && !matches!(input, Input::Scene(_)) {
+        return Err(Error::parameter("points", "a number of points is for scenes; this input has the points it has"));
+    }
     match input {
         Input::Scene(path) => {
             let lit = pipeline::light(path, &settings, &panel.grid, panel.wavelength, progress)?;
@@ -174,7 +208,8 @@ pub(super) fn load_points(
                 rays: Some([lit.view.width, lit.view.height]),
                 phase: format!("{:?}", settings.phase),
             };
-            Ok(Points { cloud: lit.placed.cloud.clone(), metadata, lit: Some(lit) })
+            let path_eye = Some(placing.eye).filter(|_| settings.phase == Phase::Path);
+            Ok(Points { cloud: lit.placed.cloud.clone(), metadata, lit: Some(lit), path_eye })
         }
         Input::Points(path) => {
             let read = ply::read(path)?;
@@ -190,7 +225,10 @@ pub(super) fn load_points(
                 return Err(Error::input(path, "all its points are dark: no amplitude is above zero"));
             }
             report_cloud(&read.cloud, begin.elapsed().as_secs_f64(), report);
-            Ok(Points { cloud: read.cloud, metadata: read.metadata.unwrap_or_default(), lit: None })
+            let metadata = read.metadata.unwrap_or_default();
+            let path_eye =
+                metadata.eye.filter(|_| metadata.phase == format!("{:?}", Phase::Path)).map(DVec3::from_array);
+            Ok(Points { cloud: read.cloud, metadata, lit: None, path_eye })
         }
         Input::Images(rgb, depth) => {
             let scale = match placement.depth_scale {
@@ -207,80 +245,12 @@ pub(super) fn load_points(
             let cloud = images::read(rgb, depth, scale, &settings.placement, seed, &panel.grid)?;
             report_cloud(&cloud, begin.elapsed().as_secs_f64(), report);
             let metadata = ply::Metadata { scene: rgb.display().to_string(), ..ply::Metadata::default() };
-            Ok(Points { cloud, metadata, lit: None })
+            Ok(Points { cloud, metadata, lit: None, path_eye: None })
         }
         Input::Field(path) | Input::Frame(path) => {
             Err(Error::input(path, "is no scene, point cloud or picture with depth (rgb.png+depth.png)"))
         }
     }
-}
-
-fn report_cloud(cloud: &PointCloud, elapsed: f64, report: &mut Report) {
-    let depth = cloud.depth_range();
-    report.add("points", cloud.points.len(), "");
-    report.add_serialised("depth", &depth, "");
-    let range =
-        depth.map(|(far, near)| format!(", z {} … {}", show_length(far), show_length(near))).unwrap_or_default();
-    report.add(
-        "points_seconds",
-        elapsed,
-        format!("points       {:>8}  {} points{range}", seconds(elapsed), count(cloud.points.len())),
-    );
-}
-
-fn report_light(lit: &Lit, elapsed: f64, report: &mut Report) {
-    report.warn(lit.warnings.iter());
-    let (light, trace) = (&lit.illumination, &lit.trace);
-    let load = (elapsed - light.seconds - trace.seconds).max(0.0);
-    report.add("scene_seconds", load, format!("scene        {:>8}", seconds(load)));
-    let energy = &light.energy;
-    for (key, value) in
-        [("energy_emitted", energy.emitted), ("energy_absorbed", energy.absorbed), ("energy_escaped", energy.escaped)]
-    {
-        report.add(key, value.to_array().to_vec(), "");
-    }
-    report.add("light_residual", light.convergence.residual, "");
-    report.add(
-        "light_seconds",
-        light.seconds,
-        format!(
-            "light        {:>8}  {} patches, {} iterations to a residual of {:.1e}; energy in = absorbed + escaped within {:.2} %",
-            seconds(light.seconds),
-            count(light.patches),
-            light.convergence.iterations,
-            light.convergence.residual,
-            100.0 * light.energy.imbalance()
-        ),
-    );
-    report.add("patches", light.patches, "");
-    report.add("rays", trace.rays, "");
-    report.add(
-        "trace_seconds",
-        trace.seconds,
-        format!("rays         {:>8}  {} rays", seconds(trace.seconds), count(trace.rays as usize)),
-    );
-    report_cloud(&lit.placed.cloud, 0.0, report);
-    report.add_serialised("white", &lit.white, "");
-    report.add("clipped_light", lit.clipped_light, "");
-    if let Some(white) = lit.white.filter(|_| lit.clipped_light > 0.0) {
-        let clipped = 100.0 * lit.clipped_light;
-        report.add("", Value::Null, format!("exposure               white is {white:.3} W/(m² sr); {clipped:.0} % of the light is brighter and clipped (--white)"));
-    }
-    report.add("mirrored_points", trace.by_mirror, "");
-    report.add("beyond_cone", lit.placed.beyond_cone, "");
-    report.add("beyond_cone_light", lit.placed.beyond_cone_light, "");
-    if lit.placed.beyond_cone > 0 {
-        report.warn([format!(
-            "{} points ({:.1} % of the light) stand where the panel cannot send light to the eye; move the viewer back or use a finer pitch",
-            count(lit.placed.beyond_cone),
-            100.0 * lit.placed.beyond_cone_light
-        )]);
-    }
-}
-
-/// Luminance that pictures of a scene show as white.
-pub(super) fn white_of(lit: &Lit) -> f32 {
-    lit.white.unwrap_or_else(|| pipeline::white_level(&lit.view.picture))
 }
 
 pub(super) fn luminance_picture(lit: &Lit) -> Picture {

@@ -2,10 +2,13 @@
 
 mod args;
 mod bar;
+mod colour;
 mod commands;
+mod light;
 mod load;
 mod monitors;
 mod report;
+mod scene_args;
 #[cfg(feature = "display")]
 mod screen;
 mod show;

@@ -28,6 +28,14 @@ impl Report {
         let value = serde_json::to_value(value).unwrap_or(Value::Null);
         self.add(key, value, line);
     }
+    /// Adds the report of a part: an object under its name for machines, its lines under `line` for people.
+    pub(crate) fn add_part(&mut self, name: &str, line: impl Into<String>, part: Self) {
+        self.add(name, part.json(), line);
+        let new: Vec<String> = part.warnings.into_iter().filter(|w| !self.warnings.contains(w)).collect();
+        self.warnings.extend(new);
+        let lines = part.entries.into_iter().map(|(_, _, line)| line).filter(|line| !line.is_empty());
+        self.entries.extend(lines.map(|line| (String::new(), Value::Null, format!("  {line}"))));
+    }
     /// Adds warnings; they go to standard error at once, and into the JSON.
     pub(crate) fn warn<W: ToString>(&mut self, warnings: impl IntoIterator<Item = W>) {
         for warning in warnings {

@@ -26,10 +26,10 @@ impl Screen {
         Ok(Self { display, choice })
     }
 
-    /// Shows the frame as the panel's packing says, until the time is over, Esc, or Ctrl-C.
+    /// Shows the frames (several where the panel's packing carries them) as it says, until the time is over, Esc, or Ctrl-C.
     pub(super) fn show(
         mut self,
-        frame: &Frame,
+        frames: &[&Frame],
         args: &ShowArgs,
         progress: &Arc<Progress>,
         report: &mut Report,
@@ -39,7 +39,8 @@ impl Screen {
             Some(hold) => return Err(Error::parameter("hold", format!("{hold} is not a number of seconds"))),
             None => None,
         };
-        let signal = frame.metadata.panel.signal.pack(&[frame])?;
+        let Some(first) = frames.first() else { return Err(Error::parameter("frame", "there is none to show")) };
+        let signal = first.metadata.panel.signal.pack(frames)?;
         let pixels = signal.rgb.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
         let picture = DisplayFrame::from_rgb(signal.width as u32, signal.height as u32, pixels)?;
         let presenter = match args.present {

@@ -2,8 +2,9 @@
 
 use super::args::{ShowArgs, White};
 use super::bar::Bar;
+use super::colour;
 use super::commands::{content, encode_field, origin, report_field, seen_half, write_traced, write_view};
-use super::load::{self, Input, Panel, Points, channel, hologram_settings, load_points, luminance_picture, white_of};
+use super::load::{self, Input, Panel, Points, channel, hologram_settings, load_points, luminance_picture};
 use super::report::{Report, count, seconds};
 use glam::DVec2;
 use holodrive::field::Field;
@@ -11,11 +12,12 @@ use holodrive::field::npy::{self, Content};
 use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Frame, Origin};
 use holodrive::pipeline::{self, Lit};
+use holodrive::points::colour::Lasers;
 use holodrive::points::ply;
 use holodrive::progress::Progress;
 use holodrive::reconstruction::{self, Picture, Scale, View, ViewSettings, metrics};
 use holodrive::units::show_length;
-use holodrive::{Result, files};
+use holodrive::{Error, Result, files};
 use std::path::Path;
 use std::time::Instant;
 
@@ -34,13 +36,21 @@ fn run(args: &ShowArgs) -> Result<Report> {
     let begin = Instant::now();
     let mut report = Report::new("show");
     let source = load::input(&args.input)?;
-    let panel = load::panel(&args.panel, &mut report)?;
+    let panel = load::panel_in_color(&args.panel, &args.color, &mut report)?;
     let out = &args.output;
     #[cfg(not(feature = "display"))]
     if args.monitor.is_some() {
-        return Err(holodrive::Error::unsupported(
-            "this build has no display; build it with the feature `display` (the default)",
-        ));
+        return Err(Error::unsupported("this build has no display; build it with the feature `display` (the default)"));
+    }
+    if let Some(lasers) = &panel.lasers {
+        if matches!(source, Input::Frame(_) | Input::Field(_)) {
+            let what = "three lasers are for scenes, point clouds and pictures with depth; this input is of one";
+            return Err(Error::parameter("wavelengths", what));
+        }
+        if args.monitor.is_some() {
+            colour::carried(&panel)?;
+        }
+        return in_color(args, &source, (&panel, lasers), begin, report);
     }
     // A monitor that is not there is found out before the work, not after it.
     #[cfg(feature = "display")]
@@ -91,7 +101,7 @@ fn run(args: &ShowArgs) -> Result<Report> {
     #[cfg(feature = "display")]
     if let Some(screen) = screen {
         bar.progress.start("", 0);
-        screen.show(&frame, args, &bar.progress, &mut report)?;
+        screen.show(&[&frame], args, &bar.progress, &mut report)?;
         return finish(report, out);
     }
     look(&frame, lit.as_ref(), &content, args, &bar.progress, &mut report)?;
@@ -99,6 +109,38 @@ fn run(args: &ShowArgs) -> Result<Report> {
     let total = begin.elapsed().as_secs_f64();
     report.add("seconds", total, format!("in all       {:>8}", seconds(total)));
     finish(report, out)
+}
+
+/// The whole way in three colours.
+fn in_color(
+    args: &ShowArgs,
+    source: &Input,
+    (panel, lasers): (&Panel, &Lasers),
+    begin: Instant,
+    mut report: Report,
+) -> Result<Report> {
+    #[cfg(feature = "display")]
+    let screen = args.monitor.as_deref().map(super::screen::Screen::find).transpose()?;
+    files::output_folder(&args.output)?;
+    let bar = Bar::new();
+    let points = load_points(source, (&args.light, &args.placement, White::Auto), panel, &bar.progress, &mut report)?;
+    write_points(&args.output, &points, &mut report)?;
+    let colors = colour::frames(args, (panel, lasers), &points, &bar.progress, &mut report)?;
+    let to_frame = begin.elapsed().as_secs_f64();
+    report.add("to_frame_seconds", to_frame, format!("to the frames{:>8}", seconds(to_frame)));
+    #[cfg(feature = "display")]
+    if let Some(screen) = screen {
+        bar.progress.start("", 0);
+        let frames = colors.for_signal()?;
+        screen.show(&frames.iter().collect::<Vec<_>>(), args, &bar.progress, &mut report)?;
+        return finish(report, &args.output);
+    }
+    let content = content(&points.cloud, &points.metadata);
+    colour::look(&colors, points.lit.as_ref(), &content, args, &bar.progress, &mut report)?;
+    drop(bar);
+    let total = begin.elapsed().as_secs_f64();
+    report.add("seconds", total, format!("in all       {:>8}", seconds(total)));
+    finish(report, &args.output)
 }
 
 fn finish(mut report: Report, out: &Path) -> Result<Report> {
@@ -165,7 +207,7 @@ fn look(
     let placing = &lit.view.placing;
     let half_at = |z: f64| placing.view_at(z);
     let target = luminance_picture(lit);
-    let white = white_of(lit);
+    let white = lit.exposed.white;
 
     let step = focus_step(&field, &settings, half_at(content.depth.map_or(0.0, |d| d[0])), size);
     let (sharp, planes) =
@@ -213,7 +255,7 @@ fn look(
 }
 
 /// Planes to look at when nothing but the depth range is known.
-fn planes_of(content: &Content) -> Vec<(&'static str, f64)> {
+pub(super) fn planes_of(content: &Content) -> Vec<(&'static str, f64)> {
     match content.depth {
         Some([near, far]) if (near - far).abs() > 1e-6 => {
             vec![("near", near), ("middle", 0.5 * (near + far)), ("far", far)]
@@ -225,7 +267,7 @@ fn planes_of(content: &Content) -> Vec<(&'static str, f64)> {
 
 /// Distance of planes at which defocus blurs by at most one cell of the picture between them: cell / tan θ, with θ the
 /// half angle of the light's cone, sin θ = λ·f_max.
-fn focus_step(field: &Field, settings: &ViewSettings, half: DVec2, size: (usize, usize)) -> f64 {
+pub(super) fn focus_step(field: &Field, settings: &ViewSettings, half: DVec2, size: (usize, usize)) -> f64 {
     let cell = (2.0 * half.x / size.0 as f64).min(2.0 * half.y / size.1 as f64);
     let frequency = settings.aperture.map_or(field.grid.limit_x(), |a| a.half[0].max(a.half[1]));
     let sine = (field.wavelength * frequency).clamp(1e-6, 0.9);

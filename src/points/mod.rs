@@ -3,6 +3,9 @@
 mod eye;
 #[cfg(test)]
 mod eye_tests;
+pub mod budget;
+pub mod colour;
+pub mod exposure;
 pub mod images;
 pub mod placement;
 pub mod ply;

@@ -114,21 +114,25 @@ impl Placement {
                 format!("the eye at {eye} m must stand in front of the panel and of the points at {frontmost} m");
             return Err(Error::parameter("eye", what));
         }
+        // The largest window of the picture's shape that the panel holds: what is traced is what is looked at.
+        let window_height = height.min(width / picture_aspect);
+        let window = 0.5 * DVec2::new(window_height * picture_aspect, window_height);
         match *self {
             Self::Window { eye, near, far } => {
                 if !(near.is_finite() && far.is_finite() && far <= near) {
                     let what = format!("near {near} m and far {far} m (z): far must be at or behind near");
                     return Err(Error::parameter("near/far", what));
                 }
-                let (half_width, half_height) = camera.half_size(picture_aspect);
-                let aspect = half_width / half_height;
-                let window_height = height.min(width / aspect);
-                let window = 0.5 * DVec2::new(window_height * aspect, window_height);
                 let map = Map::Window { near, far };
-                Ok(Placing { camera: camera.clone(), aspect, eye: DVec3::new(0.0, 0.0, eye), window, map })
+                Ok(Placing {
+                    camera: camera.clone(),
+                    aspect: picture_aspect,
+                    eye: DVec3::new(0.0, 0.0, eye),
+                    window,
+                    map,
+                })
             }
             Self::Model { eye, z, scale } => {
-                let window = 0.5 * DVec2::new(width, height);
                 let axes = DMat3::from_mat4(camera.world_from_camera);
                 let (center, half) = box_along(scene, axes)
                     .ok_or_else(|| Error::parameter("placement", "the scene has no triangles to place"))?;
@@ -143,7 +147,7 @@ impl Placement {
                     DMat4::from_translation(DVec3::new(0.0, 0.0, z)) * rotate * DMat4::from_translation(-center);
                 let world_from_hologram = hologram_from_world.inverse();
                 let eye = DVec3::new(0.0, 0.0, eye);
-                let aspect = window.x / window.y;
+                let aspect = picture_aspect;
                 let camera = Camera {
                     name: "eye".into(),
                     world_from_camera: DMat4::from_mat3_translation(axes, world_from_hologram.transform_point3(eye)),
@@ -199,10 +203,7 @@ pub fn place(points: &[WorldPoint], placing: &Placing, phase: Phase, panel: &Gri
         let phase = match phase {
             Phase::Zero => 0.0,
             Phase::Random { seed } => Random::new(seed, index as u64).phase(),
-            Phase::Path => {
-                let turns = -distance / wavelength;
-                std::f64::consts::TAU * (turns - turns.floor())
-            }
+            Phase::Path => path_phase(distance, wavelength),
         };
         rgb.push(point.radiance.map(amplitude));
         placed.cloud.points.push(PointSource {
@@ -214,6 +215,13 @@ pub fn place(points: &[WorldPoint], placing: &Placing, phase: Phase, panel: &Gri
     placed.cloud.rgb = Some(rgb);
     placed.beyond_cone_light = if all_light > 0.0 { lost_light / all_light } else { 0.0 };
     placed
+}
+
+/// −k·distance, reduced to 0 … 2π [rad], for a vacuum wavelength [m]: the phase with which a wave from that distance [m]
+/// arrives in step.
+pub fn path_phase(distance: f64, wavelength: f64) -> f64 {
+    let turns = -distance / wavelength;
+    std::f64::consts::TAU * (turns - turns.floor())
 }
 
 impl Placing {
@@ -350,6 +358,26 @@ mod tests {
         let local = placing.camera.world_from_camera.inverse().transform_vector3(toward);
         let hologram = (out[1].position - placing.eye).normalize();
         assert!((local - hologram).length() < 1e-12);
+    }
+
+    #[test]
+    fn every_placement_shows_the_rays_picture_unsqueezed() {
+        // A square picture on a panel of 16 : 9, as a window and as a model: the corner of the picture is the corner of
+        // the window, and the window has the picture's shape.
+        for placement in [Placement::default(), Placement::Model { eye: 0.5, z: -0.2, scale: None }] {
+            for aspect in [1.0, 2.5, 16.0 / 9.0] {
+                let placing = placement.prepare(&scene(), &camera(), aspect, &panel()).expect("placing");
+                assert!((placing.window.x / placing.window.y - aspect).abs() < 1e-12, "{placement:?}");
+                let at = |u, v| {
+                    let ray = placing.camera.ray(u, v, placing.aspect);
+                    WorldPoint { position: ray.at(3.0), radiance: [1.0; 3] }
+                };
+                let corner = place(&[at(0.0, 0.0), at(0.5, 0.5)], &placing, Phase::Zero, &panel(), 632.8e-9);
+                let p = corner.cloud.points[0].position;
+                let seen = DVec2::new(p.x, p.y) * placing.eye.z / (placing.eye.z - p.z);
+                assert!((seen - placing.window * DVec2::new(-1.0, 1.0)).length() < 1e-9, "{placement:?}: {seen}");
+            }
+        }
     }
 
     #[test]

@@ -5,9 +5,13 @@
 //! carried to the pupil's plane, cut by it, and carried back to the plane that the eye focuses on, which is the image
 //! on the retina up to its scale, upright.
 
+pub mod colour;
+pub mod flat_field;
 pub mod metrics;
 mod picture;
 
+pub use colour::{ColorLight, ColorPicture};
+pub use flat_field::Cone;
 pub use picture::{Picture, Scale, write_rgb_png};
 
 use crate::error::{Error, Result};

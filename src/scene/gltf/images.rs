@@ -1,6 +1,7 @@
 //! Images and samplers to decoded textures; only those that a material in use needs.
 
 use super::document::Document;
+use super::ktx2;
 use super::resources::{MAX_FILE_BYTES, read_uri};
 use crate::error::Result;
 use crate::scene::Warning;
@@ -129,10 +130,10 @@ fn image_bytes(document: &Document, image: &json::Image) -> Result<std::result::
     })
 }
 
-/// Decodes PNG or JPEG by content, whatever the file's name or declared type says.
+/// Decodes PNG, JPEG or plain KTX2 by content, whatever the file's name or declared type says.
 fn decode_picture(bytes: &[u8]) -> std::result::Result<image::RgbaImage, String> {
-    if bytes.starts_with(b"\xabKTX 20\xbb") {
-        return Err("KTX2 images are not read, only PNG and JPEG; convert it".to_owned());
+    if bytes.starts_with(ktx2::IDENTIFIER) {
+        return ktx2::decode(bytes, MAX_IMAGE_SIDE, MAX_DECODER_BYTES);
     }
     let format = match image::guess_format(bytes) {
         Ok(format @ (image::ImageFormat::Png | image::ImageFormat::Jpeg)) => format,

@@ -26,6 +26,7 @@ mod animation;
 mod cameras;
 mod document;
 mod images;
+mod ktx2;
 mod lights;
 mod materials;
 mod meshes;
