@@ -94,7 +94,9 @@ pub(super) fn hologram_settings(args: &HologramArgs, engine: Option<EngineArg>) 
             EngineArg::Direct => Method::Direct,
             EngineArg::Tiles => Method::Tiles,
             EngineArg::Planes => Method::Planes,
+            EngineArg::Gpu => Method::Gpu,
         }),
+        memory: args.memory,
         ..HologramSettings::default()
     }
 }

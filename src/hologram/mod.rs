@@ -6,6 +6,8 @@
 
 pub mod definition;
 mod exact;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod lanes;
 mod near;
 mod oracle;
@@ -40,6 +42,8 @@ pub enum Method {
     Tiles,
     /// Spectral wavefront recording planes; [`Cull::Soft`] only.
     Planes,
+    /// The sum of `tiles` on a graphics processor (feature `gpu`).
+    Gpu,
 }
 
 impl Method {
@@ -50,6 +54,7 @@ impl Method {
             Self::Direct => "direct",
             Self::Tiles => "tiles",
             Self::Planes => "planes",
+            Self::Gpu => "gpu",
         }
     }
 }
@@ -151,18 +156,26 @@ pub fn compute(
     let cull = plan.settings.cull;
     let sources = sources(points)?;
     let coverage = Coverage::of(points.len(), &sources, grid, &optics, cull);
+    progress.check()?;
     let set = plan.instruction_set;
     let (field, error_bound) = match plan.engine {
-        Engine::Oracle => (oracle(points, grid, wavelength, cull)?.to_f32(), ORACLE_ERROR),
+        Engine::Oracle => (oracle::watched(points, grid, wavelength, cull, progress)?.to_f32(), ORACLE_ERROR),
         Engine::Exact { error } => {
-            let division = Division::new(&optics, grid, &sources, cull, error);
+            let division = Division::new(&optics, grid, &sources, cull, error, progress);
+            progress.check()?;
             (division.sum(grid, &optics, &sources, cull, set, progress)?, division.error)
         }
+        Engine::Gpu { error } => {
+            let division = Division::new(&optics, grid, &sources, cull, error, progress);
+            progress.check()?;
+            (division.sum_on_gpu(grid, &optics, &sources, cull, progress)?, division.gpu_error())
+        }
         Engine::Planes(parameters) => {
-            let met = planes::met(&optics, grid, &sources);
+            let cloud = planes::Cloud::new(&optics, grid, &sources);
+            progress.check()?;
             let mut field = Field::zeros(*grid, wavelength);
-            planes::add(&mut field, &optics, &met, &parameters, set, progress)?;
-            (field, parameters.error(&optics, &met, planes::steepness(&optics, grid, &met)))
+            planes::add(&mut field, &optics, &cloud, &parameters, set, progress)?;
+            (field, parameters.error(&optics, &cloud))
         }
     };
     let report = HologramReport {
@@ -178,5 +191,18 @@ pub fn compute(
     Ok(Computed { field, report })
 }
 
+/// Name of the graphics processor that [`Method::Gpu`] computes on.
+///
+/// # Errors
+/// [`Error::Unsupported`](crate::Error::Unsupported) where there is none, or in a build without the feature `gpu`.
+pub fn gpu_adapter() -> Result<&'static str> {
+    #[cfg(feature = "gpu")]
+    return gpu::adapter();
+    #[cfg(not(feature = "gpu"))]
+    Err(exact::no_gpu())
+}
+
+#[cfg(test)]
+mod properties;
 #[cfg(test)]
 mod tests;
