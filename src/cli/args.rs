@@ -207,6 +207,8 @@ pub(crate) enum EngineArg {
     Planes,
     /// Vectorised sum on a graphics processor.
     Gpu,
+    /// The difference method, for comparison.
+    Recurrence,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

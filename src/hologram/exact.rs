@@ -5,7 +5,7 @@ use super::definition::Optics;
 use super::gpu;
 use super::lanes::InstructionSet;
 use super::tiles::{self, Class};
-use super::{Cull, Source, near};
+use super::{Cull, Source, near, recurrence};
 #[cfg(not(feature = "gpu"))]
 use crate::error::Error;
 use crate::error::Result;
@@ -40,6 +40,8 @@ pub(crate) struct Division {
     pub(crate) far: Vec<Class>,
     /// Bound on the relative L2 error of the field.
     pub(crate) error: f64,
+    /// Part of it that the separable far form makes.
+    form: f64,
     /// Memory beside the field [bytes].
     pub(crate) bytes: u64,
 }
@@ -72,7 +74,7 @@ impl Division {
         // Near points first, then one class after another; the lists of indexes stay.
         let engine = far.iter().map(|class| class.bytes(optics, cull)).max().unwrap_or(0);
         let bytes = near::bytes(optics, sources, &near).max(engine) + (size_of::<usize>() * sources.len()) as u64;
-        Self { near, far, error: form + shape + ROUNDING, bytes }
+        Self { near, far, error: form + shape + ROUNDING, form, bytes }
     }
 
     /// Predicted work on AVX-512 [core-seconds].
@@ -86,6 +88,37 @@ impl Division {
         let tiles =
             |class: &Class| (grid.width.div_ceil(class.shape.width) * grid.height.div_ceil(class.shape.height)) as u64;
         self.near.len() as u64 + self.far.iter().map(|class| class.len() as u64 * tiles(class)).sum::<u64>()
+    }
+
+    /// Block lengths of the classes for the difference method, and the bound on the field's error.
+    pub(crate) fn blocks(&self, optics: &Optics, error: f64) -> (Vec<usize>, f64) {
+        let sine = optics.wavelength * optics.taper[0].limit;
+        let blocks: Vec<(usize, f64)> =
+            self.far.iter().map(|class| recurrence::block(optics, class.nearest(), sine, 0.8 * error)).collect();
+        let worst = blocks.iter().map(|block| block.1).fold(0.0, f64::max);
+        let form = self.form + ROUNDING;
+        (blocks.into_iter().map(|block| block.0).collect(), worst + form)
+    }
+
+    /// The sum by the difference method.
+    #[allow(clippy::too_many_arguments)] // the engines' common list
+    pub(crate) fn sum_by_recurrence(
+        &self,
+        grid: &Grid,
+        optics: &Optics,
+        sources: &[Source],
+        cull: Cull,
+        error: f64,
+        set: InstructionSet,
+        progress: &Progress,
+    ) -> Result<Field> {
+        progress.start("hologram: difference method", 0);
+        let mut field = Field::zeros(*grid, optics.wavelength);
+        near::add(&mut field, optics, sources, &self.near, progress)?;
+        for (class, block) in self.far.iter().zip(self.blocks(optics, error).0) {
+            recurrence::add(&mut field, optics, sources, class, block, cull, set, progress)?;
+        }
+        Ok(field)
     }
 
     /// Bound on the relative L2 error of [`Division::sum_on_gpu`].

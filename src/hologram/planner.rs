@@ -6,12 +6,12 @@
 
 use super::definition::Optics;
 use super::exact::{DIRECT_ERROR, Division};
-use super::oracle;
 use super::planes::{Cloud, Parameters};
 use super::sources::{Coverage, Source, sources};
 use super::{Cull, HologramSettings, InstructionSet, Method, Plan};
 #[cfg(feature = "gpu")]
-use super::{gpu, near, tiles::Class};
+use super::{gpu, tiles::Class};
+use super::{near, oracle, recurrence};
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::points::PointSource;
@@ -48,6 +48,10 @@ pub(super) enum Engine {
     Planes(Parameters),
     /// The exact sum on the graphics processor, with the error that tiles are chosen for.
     Gpu {
+        error: f64,
+    },
+    /// The difference method, with the error that blocks are chosen for.
+    Recurrence {
         error: f64,
     },
 }
@@ -91,6 +95,23 @@ impl Job<'_> {
             error: division.error,
             memory: division.bytes,
             words,
+        }
+    }
+
+    fn recurrence(&self, error: f64, pairs: f64) -> Candidate {
+        let settings = self.settings;
+        let division = Division::new(&self.optics, self.grid, self.sources, settings.cull, error, &Progress::new());
+        let (blocks, bound) = division.blocks(&self.optics, error);
+        let (shortest, longest) = blocks.iter().fold((256, 32), |(s, l), &b| (s.min(b), l.max(b)));
+        let near = near::core_seconds(&self.optics, self.sources, &division.near);
+        let work = recurrence::core_seconds(pairs, shortest) * set_factor(settings, Method::Recurrence);
+        Candidate {
+            method: Method::Recurrence,
+            engine: Engine::Recurrence { error },
+            core_seconds: near + work,
+            error: bound,
+            memory: division.bytes + recurrence::bytes(longest),
+            words: format!("differences along {shortest} px"),
         }
     }
 
@@ -152,7 +173,7 @@ fn set_factor(settings: &HologramSettings, method: Method) -> f64 {
     match (settings.instruction_set.unwrap_or_else(InstructionSet::detect), method) {
         (InstructionSet::Avx512, _) | (_, Method::Oracle | Method::Gpu) => 1.0,
         (InstructionSet::Avx2, _) => 1.3,
-        (InstructionSet::Portable, Method::Direct) => 5.5,
+        (InstructionSet::Portable, Method::Direct | Method::Recurrence) => 5.5,
         (InstructionSet::Portable, Method::Tiles) => 9.5,
         (InstructionSet::Portable, Method::Planes) => 4.0,
     }
@@ -185,6 +206,7 @@ pub fn plan(points: &[PointSource], grid: &Grid, wavelength: f64, settings: &Hol
                 Method::Tiles => job.exact(method, error),
                 Method::Planes => job.planes().ok_or_else(|| refuse_planes(settings))?,
                 Method::Gpu => job.gpu(error, pairs, threads)?,
+                Method::Recurrence => job.recurrence(error, pairs),
             };
             let reason = format!("{} as asked for", candidate.words);
             (candidate, reason)

@@ -1,7 +1,6 @@
 //! Engines against the oracle, as complex fields.
 
 use super::*;
-use crate::error::Error;
 use crate::field::relative_error;
 use crate::random::Random;
 use glam::DVec3;
@@ -284,4 +283,45 @@ fn gpu_stops_when_asked_and_is_never_chosen_where_it_is_the_cpu() {
         let settings = HologramSettings { cull: Cull::None, ..HologramSettings::default() };
         assert_ne!(plan_of(&settings).method, Method::Gpu);
     }
+}
+
+#[test]
+fn the_difference_method_keeps_the_error_that_it_states() {
+    let grid = panel();
+    for (name, points) in clouds(false) {
+        let exact = oracle(&points, &grid, WAVELENGTH, Cull::Soft).expect("oracle");
+        for set in InstructionSet::available() {
+            for error in [1e-2, 1e-3] {
+                let got = field(&points, &grid, &settings(Method::Recurrence, error, set));
+                let (found, bound) = (relative_error(&got.field.samples, &exact.samples), got.report.error_bound);
+                println!("{name} {} {error:.0e}: {found:.2e}, bound {bound:.2e}, {}", set.name(), got.report.reason);
+                assert!(found < bound && bound < 1.1 * error, "{name} {error:.0e}: {found:.2e}, bound {bound:.2e}");
+            }
+        }
+    }
+    let points = cloud(30, [0.4e-3, -0.3e-3], [3e-3, 3e-3], [-0.05, -0.2], false);
+    let exact = oracle(&points, &grid, WAVELENGTH, Cull::Hard).expect("oracle");
+    let settings =
+        HologramSettings { cull: Cull::Hard, ..settings(Method::Recurrence, 1e-3, InstructionSet::detect()) };
+    let got = field(&points, &grid, &settings);
+    assert!(relative_error(&got.field.samples, &exact.samples) < 1e-3);
+}
+
+#[test]
+fn passes_refine_to_the_whole_field() {
+    let grid = Grid::new(151, 95, 8e-6, 6.5e-6).expect("grid");
+    let points = cloud(4_000, [0.0; 2], [3e-3, 2e-3], [-0.2, -0.25], false);
+    let wanted = HologramSettings { memory: 4 << 30, ..HologramSettings::default() };
+    let exact = oracle(&points, &grid, WAVELENGTH, Cull::Soft).expect("oracle");
+    let mut energies = Vec::new();
+    let show = |field: &Field, gain: f32| energies.push(field.energy() * f64::from(gain * gain));
+    let progress = Progress::new();
+    let got = compute_progressively(&points, &grid, WAVELENGTH, &wanted, 4, &progress, show).expect("field");
+    let error = relative_error(&got.field.samples, &exact.samples);
+    println!("four passes: {error:.2e}, bound {:.2e}", got.report.error_bound);
+    assert!(error < 1e-3 && got.report.coverage.points == 4_000);
+    // The first pass has 63 points: their energy is the whole's to about one in √63.
+    assert_eq!(energies.len(), 4);
+    assert!(energies.iter().all(|e| (e / energies[3] - 1.0).abs() < 0.4), "{energies:?}");
+    assert!(compute_progressively(&points, &grid, WAVELENGTH, &wanted, 0, &progress, |_, _| ()).is_err());
 }

@@ -47,7 +47,7 @@ impl EdgeTable {
         Self { half, lowest, count, values }
     }
     /// The level nearest to q.
-    pub(super) fn level(&self, q: f64) -> &[f32] {
+    pub(crate) fn level(&self, q: f64) -> &[f32] {
         let index = ((q - self.lowest) / Self::STEP + 0.5).max(0.0) as usize;
         let index = index.min(self.count - 1);
         &self.values[index * LEVEL..(index + 1) * LEVEL]

@@ -185,8 +185,11 @@ unsafe fn evaluate<L: Lanes>(factor: &Factor, u: L) -> (L, L) {
 }
 
 /// T at segment coordinates `t`: (re, im) for a diverging wave.
+///
+/// # Safety
+/// As [`Lanes`]; `level` is one of an [`EdgeTable`].
 #[inline(always)]
-unsafe fn taper<L: Lanes>(t: L, level: &[f32]) -> (L, L) {
+pub(crate) unsafe fn taper<L: Lanes>(t: L, level: &[f32]) -> (L, L) {
     // SAFETY: the caller's promise; a level has its eight runs of sixteen.
     unsafe {
         let t = t.max(L::splat(0.0)).min(L::splat(15.999_99));

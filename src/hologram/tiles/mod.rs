@@ -12,7 +12,7 @@ mod kernel;
 mod shape;
 
 pub(crate) use edge::EdgeTable;
-pub(crate) use kernel::{Axis, Limit};
+pub(crate) use kernel::{Axis, Limit, taper};
 pub(crate) use shape::Shape;
 
 use super::Cull;
@@ -82,6 +82,10 @@ impl Class {
         let parts: Vec<f64> =
             self.sources.par_chunks(4096).map(|part| part.iter().map(|&i| count(&sources[i])).sum()).collect();
         parts.iter().sum::<f64>() * tile
+    }
+    /// Distance of the nearest source [m].
+    pub(crate) fn nearest(&self) -> f64 {
+        self.distance[0]
     }
     /// The class's sources, in the order of their x.
     pub(crate) fn members(&self, sources: &[Source]) -> Vec<Source> {
