@@ -27,6 +27,9 @@ const TIMES: [(&str, f64); 4] = [("us", 1e-6), ("µs", 1e-6), ("ms", 1e-3), ("s"
 /// Frequency units by their factor to hertz.
 const FREQUENCIES: [(&str, f64); 3] = [("Hz", 1.0), ("kHz", 1e3), ("MHz", 1e6)];
 
+/// Units of memory by their factor to bytes; as the error of a job that does not fit counts them.
+const MEMORIES: [(&str, f64); 3] = [("kB", 1024.0), ("MB", 1048576.0), ("GB", 1073741824.0)];
+
 fn parse(text: &str, units: &[(&str, f64)], kind: &'static str, example: &str) -> Result<f64> {
     let text = text.trim();
     let split = text
@@ -66,6 +69,16 @@ pub fn length(text: &str) -> Result<f64> {
 pub fn positive_length(text: &str) -> Result<f64> {
     let value = length(text)?;
     if value > 0.0 { Ok(value) } else { Err(Error::parameter("length", format!("`{text}` must be greater than zero"))) }
+}
+
+/// Reads an amount of memory with its unit: `2GB` → 2³¹ [bytes].
+pub fn memory(text: &str) -> Result<u64> {
+    let value = parse(text, &MEMORIES, "memory", "500MB, 2GB")?;
+    if value >= 1.0 {
+        Ok(value as u64)
+    } else {
+        Err(Error::parameter("memory", format!("`{text}` must be greater than zero")))
+    }
 }
 
 /// Reads an angle with its unit: `2deg` → 0.0349 [rad].

@@ -90,6 +90,10 @@ pub(crate) struct HologramArgs {
     /// Largest relative L2 error of the field.
     #[arg(long, default_value_t = 1e-3, value_name = "ERROR")]
     pub(crate) error: f64,
+    /// Memory that the computation of the field may take beside points and field; less means fewer or smaller tables,
+    /// and a refusal where no engine fits.
+    #[arg(long, default_value = "1GB", value_parser = units::memory, value_name = "SIZE")]
+    pub(crate) memory: u64,
     /// Which light of a coloured cloud.
     #[arg(long, value_enum, default_value_t = ChannelArg::Luminance, conflicts_with = "wavelengths")]
     pub(crate) channel: ChannelArg,
@@ -105,6 +109,10 @@ pub(crate) enum EngineArg {
     Tiles,
     /// Spectral wavefront recording planes.
     Planes,
+    /// Vectorised sum on a graphics processor.
+    Gpu,
+    /// The difference method, for comparison.
+    Recurrence,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -123,7 +123,10 @@ pub(super) fn hologram_settings(args: &HologramArgs, engine: Option<EngineArg>) 
             EngineArg::Direct => Method::Direct,
             EngineArg::Tiles => Method::Tiles,
             EngineArg::Planes => Method::Planes,
+            EngineArg::Gpu => Method::Gpu,
+            EngineArg::Recurrence => Method::Recurrence,
         }),
+        memory: args.memory,
         ..HologramSettings::default()
     }
 }

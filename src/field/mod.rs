@@ -24,15 +24,10 @@ pub struct Field<T = f32> {
     pub samples: Vec<Complex<T>>,
 }
 
-impl<T: num_complex::ComplexFloat + Copy> Field<T>
-where
-    Complex<T>: Copy,
-    T: From<f32>,
-{
-    /// The dark field.
+impl<T: bytemuck::Zeroable> Field<T> {
+    /// The dark field; its memory is taken page by page when it is first written.
     pub fn zeros(grid: Grid, wavelength: f64) -> Self {
-        let zero: T = 0f32.into();
-        Self { grid, wavelength, samples: vec![Complex { re: zero, im: zero }; grid.len()] }
+        Self { grid, wavelength, samples: bytemuck::zeroed_vec(grid.len()) }
     }
 }
 

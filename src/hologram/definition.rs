@@ -159,11 +159,13 @@ pub fn erfc(z: Complex64) -> Complex64 {
         }
         return 1.0 - sum * (2.0 / PI.sqrt());
     }
-    if square.re > 700.0 {
+    // |erfc| < e^{−40}/(6π½) there: below f64's resolution of the 1 or 2 that it stands beside.
+    if square.re > 40.0 {
         return Complex64::default();
     }
     let mut tail = z;
-    for k in (1..60).rev() {
+    // The fraction converges the faster the larger |z|: 68 terms at 3, 23 at 6.
+    for k in (1..8 + (540.0 / z.norm_sqr()) as usize).rev() {
         tail = z + 0.5 * k as f64 / tail;
     }
     (-square).exp() / (tail * PI.sqrt())

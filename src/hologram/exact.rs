@@ -1,12 +1,17 @@
 //! The engines `direct` and `tiles`: every point at every pixel of its cone, near points and far ones each by their form.
 
 use super::definition::Optics;
+#[cfg(feature = "gpu")]
+use super::gpu;
 use super::lanes::InstructionSet;
 use super::tiles::{self, Class};
-use super::{Cull, Source, near};
+use super::{Cull, Source, near, recurrence};
+#[cfg(not(feature = "gpu"))]
+use crate::error::Error;
 use crate::error::Result;
 use crate::field::{Field, Grid};
 use crate::progress::Progress;
+use rayon::prelude::*;
 
 /// Error of `direct`, whatever was asked: its tiles are chosen below this.
 pub(crate) const DIRECT_ERROR: f64 = 1e-4;
@@ -17,6 +22,15 @@ const NEAREST_EDGE: f64 = 0.94;
 /// Rounding of phases and sums in f32 (relative L2, measured).
 const ROUNDING: f64 = 1e-5;
 
+/// Rounding of phases, and polynomials, in the shader (relative L2).
+const GPU_ROUNDING: f64 = 1e-4;
+
+/// What a build without the feature `gpu` says.
+#[cfg(not(feature = "gpu"))]
+pub(super) fn no_gpu() -> Error {
+    Error::unsupported("this build has no GPU engine; build it with the feature gpu, or take tiles or planes")
+}
+
 /// How the points are divided among the two forms and the classes of distance.
 #[derive(Clone, Debug)]
 pub(crate) struct Division {
@@ -26,35 +40,47 @@ pub(crate) struct Division {
     pub(crate) far: Vec<Class>,
     /// Bound on the relative L2 error of the field.
     pub(crate) error: f64,
+    /// Part of it that the separable far form makes.
+    form: f64,
     /// Memory beside the field [bytes].
     pub(crate) bytes: u64,
-    /// Predicted work on AVX-512 [core-seconds].
-    pub(crate) core_seconds: f64,
 }
 
 impl Division {
-    /// Divides points for a wanted error.
-    pub(crate) fn new(optics: &Optics, grid: &Grid, sources: &[Source], cull: Cull, error: f64) -> Self {
+    /// Divides points for a wanted error; incomplete when asked to stop.
+    pub(crate) fn new(
+        optics: &Optics,
+        grid: &Grid,
+        sources: &[Source],
+        cull: Cull,
+        error: f64,
+        progress: &Progress,
+    ) -> Self {
         let is_near = |source: &Source| {
             let inexact = optics.edge_fresnel_number(source.distance) < NEAREST_EDGE
                 || optics.separable_far_error(source.distance) > 0.5 * error;
             cull == Cull::Soft && inexact && near::rank(optics, source.distance).is_some()
         };
-        let (near, rest): (Vec<usize>, Vec<usize>) = (0..sources.len()).partition(|&i| is_near(&sources[i]));
-        let far = tiles::classify(optics, grid, sources, &rest, cull, 0.8 * error);
-        let form = match cull {
-            Cull::Soft => rest
-                .iter()
-                .map(|&i| optics.separable_far_error(sources[i].distance.max(optics.wavelength)))
-                .fold(0.0, f64::max),
-            Cull::Hard | Cull::None => 0.0,
+        let flags: Vec<bool> = sources.par_iter().map(is_near).collect();
+        let (near, rest): (Vec<usize>, Vec<usize>) = (0..sources.len()).partition(|&i| flags[i]);
+        let far = tiles::classify(optics, grid, sources, &rest, cull, 0.8 * error, progress);
+        // The form's error falls with distance.
+        let nearest = rest.iter().map(|&i| sources[i].distance).min_by(f64::total_cmp);
+        let form = match (cull, nearest) {
+            (Cull::Soft, Some(distance)) => optics.separable_far_error(distance.max(optics.wavelength)),
+            _ => 0.0,
         };
         let shape = far.iter().map(|class| class.shape.error).fold(0.0, f64::max);
-        let bytes =
-            near::bytes(optics, sources, &near) + far.iter().map(|class| class.bytes(optics, cull)).max().unwrap_or(0);
-        let core_seconds = near::core_seconds(optics, sources, &near)
-            + far.iter().map(|class| class.core_seconds(optics, grid, sources, cull)).sum::<f64>();
-        Self { near, far, error: form + shape + ROUNDING, bytes, core_seconds }
+        // Near points first, then one class after another; the lists of indexes stay.
+        let engine = far.iter().map(|class| class.bytes(optics, cull)).max().unwrap_or(0);
+        let bytes = near::bytes(optics, sources, &near).max(engine) + (size_of::<usize>() * sources.len()) as u64;
+        Self { near, far, error: form + shape + ROUNDING, form, bytes }
+    }
+
+    /// Predicted work on AVX-512 [core-seconds].
+    pub(crate) fn core_seconds(&self, optics: &Optics, grid: &Grid, sources: &[Source], cull: Cull) -> f64 {
+        near::core_seconds(optics, sources, &self.near)
+            + self.far.iter().map(|class| class.core_seconds(optics, grid, sources, cull)).sum::<f64>()
     }
 
     /// Work in the unit that [`Progress`] counts: points of near sources, points × tiles of far ones.
@@ -62,6 +88,66 @@ impl Division {
         let tiles =
             |class: &Class| (grid.width.div_ceil(class.shape.width) * grid.height.div_ceil(class.shape.height)) as u64;
         self.near.len() as u64 + self.far.iter().map(|class| class.len() as u64 * tiles(class)).sum::<u64>()
+    }
+
+    /// Block lengths of the classes for the difference method, and the bound on the field's error.
+    pub(crate) fn blocks(&self, optics: &Optics, error: f64) -> (Vec<usize>, f64) {
+        let sine = optics.wavelength * optics.taper[0].limit;
+        let blocks: Vec<(usize, f64)> =
+            self.far.iter().map(|class| recurrence::block(optics, class.nearest(), sine, 0.8 * error)).collect();
+        let worst = blocks.iter().map(|block| block.1).fold(0.0, f64::max);
+        let form = self.form + ROUNDING;
+        (blocks.into_iter().map(|block| block.0).collect(), worst + form)
+    }
+
+    /// The sum by the difference method.
+    #[allow(clippy::too_many_arguments)] // the engines' common list
+    pub(crate) fn sum_by_recurrence(
+        &self,
+        grid: &Grid,
+        optics: &Optics,
+        sources: &[Source],
+        cull: Cull,
+        error: f64,
+        set: InstructionSet,
+        progress: &Progress,
+    ) -> Result<Field> {
+        progress.start("hologram: difference method", 0);
+        let mut field = Field::zeros(*grid, optics.wavelength);
+        near::add(&mut field, optics, sources, &self.near, progress)?;
+        for (class, block) in self.far.iter().zip(self.blocks(optics, error).0) {
+            recurrence::add(&mut field, optics, sources, class, block, cull, set, progress)?;
+        }
+        Ok(field)
+    }
+
+    /// Bound on the relative L2 error of [`Division::sum_on_gpu`].
+    pub(crate) fn gpu_error(&self) -> f64 {
+        self.error + GPU_ROUNDING
+    }
+
+    /// The sum with the far points on the graphics processor.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn sum_on_gpu(
+        &self,
+        grid: &Grid,
+        optics: &Optics,
+        sources: &[Source],
+        cull: Cull,
+        progress: &Progress,
+    ) -> Result<Field> {
+        let cells = (grid.width.div_ceil(gpu::CELL) * grid.height.div_ceil(gpu::CELL)) as u64;
+        let far: u64 = self.far.iter().map(|class| class.len() as u64).sum();
+        progress.start("hologram: sum over points", self.near.len() as u64 + far * cells);
+        let mut field = Field::zeros(*grid, optics.wavelength);
+        near::add(&mut field, optics, sources, &self.near, progress)?;
+        gpu::add(&mut field, optics, sources, &self.far, cull, progress)?;
+        Ok(field)
+    }
+    /// The sum with the far points on the graphics processor: not in this build.
+    #[cfg(not(feature = "gpu"))]
+    pub(crate) fn sum_on_gpu(&self, _: &Grid, _: &Optics, _: &[Source], _: Cull, _: &Progress) -> Result<Field> {
+        Err(no_gpu())
     }
 
     /// The sum.

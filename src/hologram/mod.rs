@@ -6,11 +6,15 @@
 
 pub mod definition;
 mod exact;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod lanes;
+pub mod layers;
 mod near;
 mod oracle;
 mod planes;
 mod planner;
+mod recurrence;
 mod sources;
 mod tiles;
 
@@ -19,7 +23,7 @@ pub use oracle::{oracle, oracle_at};
 pub use planner::plan;
 pub use sources::Coverage;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::field::{Field, Grid};
 use crate::points::PointSource;
 use crate::progress::Progress;
@@ -40,6 +44,10 @@ pub enum Method {
     Tiles,
     /// Spectral wavefront recording planes; [`Cull::Soft`] only.
     Planes,
+    /// The sum of `tiles` on a graphics processor (feature `gpu`).
+    Gpu,
+    /// Yoshikawa's difference method: for comparison, never chosen.
+    Recurrence,
 }
 
 impl Method {
@@ -50,6 +58,8 @@ impl Method {
             Self::Direct => "direct",
             Self::Tiles => "tiles",
             Self::Planes => "planes",
+            Self::Gpu => "gpu",
+            Self::Recurrence => "recurrence",
         }
     }
 }
@@ -151,18 +161,32 @@ pub fn compute(
     let cull = plan.settings.cull;
     let sources = sources(points)?;
     let coverage = Coverage::of(points.len(), &sources, grid, &optics, cull);
+    progress.check()?;
     let set = plan.instruction_set;
     let (field, error_bound) = match plan.engine {
-        Engine::Oracle => (oracle(points, grid, wavelength, cull)?.to_f32(), ORACLE_ERROR),
+        Engine::Oracle => (oracle::watched(points, grid, wavelength, cull, progress)?.to_f32(), ORACLE_ERROR),
         Engine::Exact { error } => {
-            let division = Division::new(&optics, grid, &sources, cull, error);
+            let division = Division::new(&optics, grid, &sources, cull, error, progress);
+            progress.check()?;
             (division.sum(grid, &optics, &sources, cull, set, progress)?, division.error)
         }
+        Engine::Recurrence { error } => {
+            let division = Division::new(&optics, grid, &sources, cull, error, progress);
+            progress.check()?;
+            let bound = division.blocks(&optics, error).1;
+            (division.sum_by_recurrence(grid, &optics, &sources, cull, error, set, progress)?, bound)
+        }
+        Engine::Gpu { error } => {
+            let division = Division::new(&optics, grid, &sources, cull, error, progress);
+            progress.check()?;
+            (division.sum_on_gpu(grid, &optics, &sources, cull, progress)?, division.gpu_error())
+        }
         Engine::Planes(parameters) => {
-            let met = planes::met(&optics, grid, &sources);
+            let cloud = planes::Cloud::new(&optics, grid, &sources);
+            progress.check()?;
             let mut field = Field::zeros(*grid, wavelength);
-            planes::add(&mut field, &optics, &met, &parameters, set, progress)?;
-            (field, parameters.error(&optics, &met, planes::steepness(&optics, grid, &met)))
+            planes::add(&mut field, &optics, &cloud, &parameters, set, progress)?;
+            (field, parameters.error(&optics, &cloud))
         }
     };
     let report = HologramReport {
@@ -178,5 +202,81 @@ pub fn compute(
     Ok(Computed { field, report })
 }
 
+/// Computes the field in `passes` that are shown as they come: first a quarter to the power of (`passes` − 1) of the
+/// points, then four times as many, and so on; each pass adds the points that are new to it.
+///
+/// `show` gets the field so far, and by what to multiply it to have the brightness of the whole (for random phases).
+/// The last one is the whole field; the passes' errors are independent, so the report's bound is the largest. Every
+/// pass is planned for itself: fixed costs (tables, transforms) are paid `passes` times.
+///
+/// # Errors
+/// Those of [`plan`] and [`compute`]; [`Error::Parameter`](crate::Error::Parameter) for no passes or more than eight.
+pub fn compute_progressively(
+    points: &[PointSource],
+    grid: &Grid,
+    wavelength: f64,
+    settings: &HologramSettings,
+    passes: u32,
+    progress: &Progress,
+    mut show: impl FnMut(&Field, f32),
+) -> Result<Computed> {
+    if !(1..=8).contains(&passes) {
+        return Err(Error::parameter("passes", format!("{passes}: one to eight")));
+    }
+    let step = |pass: u32| 4usize.pow(passes - 1 - pass);
+    let mut whole: Option<Computed> = None;
+    for pass in 0..passes {
+        let is_new = |i: usize| i.is_multiple_of(step(pass)) && (pass == 0 || !i.is_multiple_of(step(pass - 1)));
+        let new: Vec<PointSource> = points.iter().enumerate().filter(|(i, _)| is_new(*i)).map(|(_, p)| *p).collect();
+        let plan = plan(&new, grid, wavelength, settings)?;
+        let next = compute(&new, grid, wavelength, &plan, progress)?;
+        whole = Some(match whole {
+            None => next,
+            Some(before) => before.and(next),
+        });
+        if let Some(sum) = &whole {
+            show(&sum.field, (step(pass) as f32).sqrt());
+        }
+    }
+    whole.ok_or_else(|| Error::parameter("passes", "none"))
+}
+
+impl Computed {
+    /// The sum with a later pass.
+    fn and(mut self, next: Computed) -> Self {
+        self.field.samples.iter_mut().zip(&next.field.samples).for_each(|(u, add)| *u += add);
+        let (a, b) = (self.report.coverage, next.report.coverage);
+        let light = [&a, &b].map(|c| (c.points - c.dark) as f64);
+        let outside = (a.light_outside * light[0] + b.light_outside * light[1]) / (light[0] + light[1]).max(1.0);
+        self.report.coverage = Coverage {
+            points: a.points + b.points,
+            dark: a.dark + b.dark,
+            unreached: a.unreached + b.unreached,
+            light_outside: outside,
+            pairs: a.pairs + b.pairs,
+        };
+        let report = next.report;
+        self.report.seconds += report.seconds;
+        self.report.predicted_seconds += report.predicted_seconds;
+        self.report.error_bound = self.report.error_bound.max(report.error_bound);
+        self.report.memory = self.report.memory.max(report.memory) + 8 * self.field.samples.len() as u64;
+        (self.report.method, self.report.reason) = (report.method, report.reason);
+        self
+    }
+}
+
+/// Name of the graphics processor that [`Method::Gpu`] computes on.
+///
+/// # Errors
+/// [`Error::Unsupported`](crate::Error::Unsupported) where there is none, or in a build without the feature `gpu`.
+pub fn gpu_adapter() -> Result<&'static str> {
+    #[cfg(feature = "gpu")]
+    return gpu::adapter();
+    #[cfg(not(feature = "gpu"))]
+    Err(exact::no_gpu())
+}
+
+#[cfg(test)]
+mod properties;
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,7 @@ use super::definition::Optics;
 use crate::error::Result;
 use crate::field::{Complex64, Field, Grid};
 use crate::points::PointSource;
+use crate::progress::Progress;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -17,15 +18,43 @@ const COVERED: f64 = 5.0;
 /// Fresnel number of the edge below which the far form is not used, whatever its error.
 const NEAREST_EDGE: f64 = 0.6;
 
+/// Memory for the spectra of points that are integrated together [bytes].
+const SPECTRA: u64 = 64 << 20;
+
+/// Points that are prepared together.
+const GROUP: usize = 1 << 14;
+
 /// The field on the whole grid, in double precision.
 pub fn oracle(points: &[PointSource], grid: &Grid, wavelength: f64, cull: Cull) -> Result<Field<f64>> {
+    watched(points, grid, wavelength, cull, &Progress::new())
+}
+
+/// As [`oracle`], counting points and ready to stop.
+pub(super) fn watched(
+    points: &[PointSource],
+    grid: &Grid,
+    wavelength: f64,
+    cull: Cull,
+    progress: &Progress,
+) -> Result<Field<f64>> {
+    progress.start("hologram: oracle", points.len() as u64);
     let optics = Optics::new(grid, wavelength)?;
-    let kernels = kernels(points, &optics, cull);
     let columns: Vec<f64> = (0..grid.width).map(|column| grid.x(column)).collect();
     let mut field = Field::<f64>::zeros(*grid, wavelength);
-    field.samples.par_chunks_mut(grid.width).enumerate().for_each(|(row, samples)| {
-        kernels.iter().for_each(|kernel| kernel.add(&optics, cull, &columns, grid.y(row), samples));
-    });
+    let mut rest = points;
+    while !rest.is_empty() {
+        let (now, later) = rest.split_at(group(rest, &optics, cull));
+        let kernels = kernels(now, &optics, cull, progress);
+        progress.check()?;
+        field.samples.par_chunks_mut(grid.width).enumerate().for_each(|(row, samples)| {
+            for kernel in kernels.iter().take_while(|_| !progress.stopped()) {
+                kernel.add(&optics, cull, &columns, grid.y(row), samples, progress);
+            }
+        });
+        progress.check()?;
+        progress.advance(now.len() as u64);
+        rest = later;
+    }
     Ok(field)
 }
 
@@ -38,17 +67,59 @@ pub fn oracle_at(
     pixels: &[(usize, usize)],
 ) -> Result<Vec<Complex64>> {
     let optics = Optics::new(grid, wavelength)?;
-    let kernels = kernels(points, &optics, cull);
-    let at = |&(column, row): &(usize, usize)| {
-        let mut u = [Complex64::default()];
-        kernels.iter().for_each(|kernel| kernel.add(&optics, cull, &[grid.x(column)], grid.y(row), &mut u));
-        u[0]
-    };
-    Ok(pixels.par_iter().map(at).collect())
+    let progress = Progress::new();
+    let mut field = vec![Complex64::default(); pixels.len()];
+    let mut rest = points;
+    while !rest.is_empty() {
+        let (now, later) = rest.split_at(group(rest, &optics, cull));
+        let kernels = kernels(now, &optics, cull, &progress);
+        field.par_iter_mut().zip(pixels).for_each(|(u, &(column, row))| {
+            let (x, y) = ([grid.x(column)], grid.y(row));
+            kernels.iter().for_each(|kernel| kernel.add(&optics, cull, &x, y, std::slice::from_mut(u), &progress));
+        });
+        rest = later;
+    }
+    Ok(field)
 }
 
-fn kernels(points: &[PointSource], optics: &Optics, cull: Cull) -> Vec<Kernel> {
-    points.par_iter().filter(|p| p.amplitude != 0.0).map(|p| Kernel::new(*p, optics, cull)).collect()
+/// Memory beside points and the f32 field [bytes]: the f64 field, and the largest group of kernels.
+pub(super) fn bytes(grid: &Grid, optics: &Optics, cull: Cull, distances: impl Iterator<Item = f64>) -> u64 {
+    let (mut largest, mut sum, mut count) = (0, 0, 0);
+    for distance in distances {
+        let spectrum = spectrum_bytes(optics, cull, distance);
+        (largest, sum, count) = (spectrum.max(largest), sum + spectrum, count + 1);
+    }
+    let kernels = GROUP.min(count) * size_of::<Kernel>();
+    16 * grid.len() as u64 + sum.min(SPECTRA.max(largest)) + kernels as u64
+}
+
+/// Number of points at the front whose spectra fit together, at least one.
+fn group(points: &[PointSource], optics: &Optics, cull: Cull) -> usize {
+    let mut sum = 0;
+    let fits = |p: &&PointSource| {
+        sum += spectrum_bytes(optics, cull, p.position.z.abs());
+        sum <= SPECTRA
+    };
+    points.iter().take(GROUP).take_while(fits).count().max(1)
+}
+
+fn kernels(points: &[PointSource], optics: &Optics, cull: Cull, progress: &Progress) -> Vec<Kernel> {
+    let lit = |p: &&PointSource| p.amplitude != 0.0 && !progress.stopped();
+    points.par_iter().filter(lit).map(|p| Kernel::new(*p, optics, cull)).collect()
+}
+
+/// Whether the integral is summed at this distance, instead of its far form.
+fn integrated(optics: &Optics, cull: Cull, distance: f64) -> bool {
+    let far = optics.far_error(distance) <= EXACT && optics.edge_fresnel_number(distance) >= NEAREST_EDGE;
+    cull == Cull::Soft && !far
+}
+
+fn spectrum_bytes(optics: &Optics, cull: Cull, distance: f64) -> u64 {
+    if !integrated(optics, cull, distance) {
+        return 0;
+    }
+    let count = |axis| Spectrum::lattice(optics, axis, distance).1 as u64;
+    16 * count(0) * count(1)
 }
 
 /// One point, with its spectrum where the integral is summed.
@@ -60,18 +131,21 @@ struct Kernel {
 impl Kernel {
     fn new(point: PointSource, optics: &Optics, cull: Cull) -> Self {
         let distance = point.position.z.abs();
-        let far = optics.far_error(distance) <= EXACT && optics.edge_fresnel_number(distance) >= NEAREST_EDGE;
-        let near = (cull == Cull::Soft && !far).then(|| Spectrum::new(distance, optics));
+        let near = integrated(optics, cull, distance).then(|| Spectrum::new(distance, optics));
         Self { point, near }
     }
 
     /// Adds the point's field at the pixels (x, y) of one row.
-    fn add(&self, optics: &Optics, cull: Cull, x: &[f64], y: f64, row: &mut [Complex64]) {
+    fn add(&self, optics: &Optics, cull: Cull, x: &[f64], y: f64, row: &mut [Complex64], progress: &Progress) {
         let p = &self.point;
         let (dy, distance) = (y - p.position.y, p.position.z.abs());
         let factor = Complex64::cis(p.phase) * f64::from(p.amplitude);
         let line = self.near.as_ref().map(|spectrum| spectrum.line(dy));
         for (x, u) in x.iter().zip(row) {
+            // A pixel of a point that is integrated takes a millisecond far out.
+            if line.is_some() && progress.stopped() {
+                return;
+            }
             let dx = x - p.position.x;
             let diverging = match (cull, &self.near, &line) {
                 (Cull::Soft, Some(spectrum), Some(line)) => spectrum.at(line, dx),
@@ -107,20 +181,24 @@ struct Spectrum {
 }
 
 impl Spectrum {
+    /// Where the field has died away [m], and the number of frequencies, along an axis.
+    fn lattice(optics: &Optics, axis: usize, distance: f64) -> (f64, usize) {
+        let taper = optics.taper[axis];
+        let sine = (optics.wavelength * taper.reach(3.2)).min(0.95);
+        // The taper's transform decays as exp(−(πsx)²): 1e-12 at 1.67/s.
+        let reach = distance * sine / (1.0 - sine * sine).sqrt() + 1.67 / taper.width;
+        (reach, (2.2 * reach * 2.0 * taper.reach(COVERED)).ceil() as usize + 8)
+    }
+
     fn new(distance: f64, optics: &Optics) -> Self {
-        let mut reach = [0.0; 2];
-        let axis = |axis: usize, reach: &mut f64| -> (Vec<f64>, f64) {
-            let taper = optics.taper[axis];
-            let top = taper.reach(COVERED);
-            let sine = (optics.wavelength * taper.reach(3.2)).min(0.95);
-            // The taper's transform decays as exp(−(πsx)²): 1e-12 at 1.67/s.
-            *reach = distance * sine / (1.0 - sine * sine).sqrt() + 1.67 / taper.width;
-            let count = (2.2 * *reach * 2.0 * top).ceil() as usize + 8;
+        let axis = |axis: usize| -> (f64, Vec<f64>, f64) {
+            let (reach, count) = Self::lattice(optics, axis, distance);
+            let top = optics.taper[axis].reach(COVERED);
             let step = 2.0 * top / count as f64;
-            ((0..count).map(|i| (i as f64 + 0.5) * step - top).collect(), step)
+            (reach, (0..count).map(|i| (i as f64 + 0.5) * step - top).collect(), step)
         };
-        let (fx, step_x) = axis(0, &mut reach[0]);
-        let (fy, step_y) = axis(1, &mut reach[1]);
+        let ((reach_x, fx, step_x), (reach_y, fy, step_y)) = (axis(0), axis(1));
+        let reach = [reach_x, reach_y];
         let inverse = 1.0 / (optics.wavelength * optics.wavelength);
         let mut values = Vec::with_capacity(fx.len() * fy.len());
         let wx: Vec<f64> = fx.iter().map(|&f| optics.taper[0].at(f)).collect();

@@ -6,18 +6,36 @@
 
 use super::definition::Optics;
 use super::exact::{DIRECT_ERROR, Division};
-use super::planes::{self, Parameters};
+use super::planes::{Cloud, Parameters};
 use super::sources::{Coverage, Source, sources};
 use super::{Cull, HologramSettings, InstructionSet, Method, Plan};
+#[cfg(feature = "gpu")]
+use super::{gpu, tiles::Class};
+use super::{near, oracle, recurrence};
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::points::PointSource;
+use crate::progress::Progress;
 
 /// Error of the oracle: the far form where it stands for the integral.
 pub(super) const ORACLE_ERROR: f64 = 1e-5;
 
 /// Time of the oracle for a point and a pixel [core-seconds]; points that are integrated take thousands of times that.
 const ORACLE_PAIR: f64 = 1e-7;
+
+/// Pairs a second and core of a software adapter: a wide guess, since it is never chosen for its speed.
+#[cfg(feature = "gpu")]
+const SOFTWARE_GPU: f64 = 2e8;
+
+/// Least predicted time on the CPU for which a graphics processor is looked for [s].
+const GPU_WORTH: f64 = 1.0;
+
+fn has_hardware_gpu() -> bool {
+    #[cfg(feature = "gpu")]
+    return gpu::seconds(0.0).is_some();
+    #[cfg(not(feature = "gpu"))]
+    false
+}
 
 /// An engine with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +46,14 @@ pub(super) enum Engine {
         error: f64,
     },
     Planes(Parameters),
+    /// The exact sum on the graphics processor, with the error that tiles are chosen for.
+    Gpu {
+        error: f64,
+    },
+    /// The difference method, with the error that blocks are chosen for.
+    Recurrence {
+        error: f64,
+    },
 }
 
 /// One way to do the job.
@@ -46,11 +72,14 @@ struct Job<'a> {
     grid: &'a Grid,
     sources: &'a [Source],
     settings: &'a HologramSettings,
+    /// What is left of the budget beside the sources [bytes].
+    memory: u64,
 }
 
 impl Job<'_> {
     fn exact(&self, method: Method, error: f64) -> Candidate {
-        let division = Division::new(&self.optics, self.grid, self.sources, self.settings.cull, error);
+        let division =
+            Division::new(&self.optics, self.grid, self.sources, self.settings.cull, error, &Progress::new());
         let shape = division.far.iter().max_by_key(|class| class.len()).map(|class| class.shape);
         let words = match shape {
             Some(shape) if shape.exact => "every pixel from its own path".to_owned(),
@@ -58,29 +87,71 @@ impl Job<'_> {
             None => "points near the panel as products of kernels".to_owned(),
         };
         let factor = set_factor(self.settings, method);
+        let core_seconds = division.core_seconds(&self.optics, self.grid, self.sources, self.settings.cull);
         Candidate {
             method,
             engine: Engine::Exact { error },
-            core_seconds: division.core_seconds * factor,
+            core_seconds: core_seconds * factor,
             error: division.error,
             memory: division.bytes,
             words,
         }
     }
 
+    fn recurrence(&self, error: f64, pairs: f64) -> Candidate {
+        let settings = self.settings;
+        let division = Division::new(&self.optics, self.grid, self.sources, settings.cull, error, &Progress::new());
+        let (blocks, bound) = division.blocks(&self.optics, error);
+        let (shortest, longest) = blocks.iter().fold((256, 32), |(s, l), &b| (s.min(b), l.max(b)));
+        let near = near::core_seconds(&self.optics, self.sources, &division.near);
+        let work = recurrence::core_seconds(pairs, shortest) * set_factor(settings, Method::Recurrence);
+        Candidate {
+            method: Method::Recurrence,
+            engine: Engine::Recurrence { error },
+            core_seconds: near + work,
+            error: bound,
+            memory: division.bytes + recurrence::bytes(longest),
+            words: format!("differences along {shortest} px"),
+        }
+    }
+
+    /// The exact sum on the graphics processor; its time is guessed where it has not been measured.
+    #[cfg(feature = "gpu")]
+    fn gpu(&self, error: f64, pairs: f64, threads: f64) -> Result<Candidate> {
+        let adapter = gpu::adapter()?;
+        let division =
+            Division::new(&self.optics, self.grid, self.sources, self.settings.cull, error, &Progress::new());
+        let near = near::core_seconds(&self.optics, self.sources, &division.near);
+        let far: usize = division.far.iter().map(Class::len).sum();
+        let seconds = gpu::seconds(pairs).unwrap_or(pairs / (SOFTWARE_GPU * threads));
+        Ok(Candidate {
+            method: Method::Gpu,
+            engine: Engine::Gpu { error },
+            core_seconds: near + seconds * threads,
+            error: division.gpu_error(),
+            memory: division.bytes + gpu::bytes(self.grid, far),
+            words: format!("tiles on {adapter}"),
+        })
+    }
+    /// A build without the engine.
+    #[cfg(not(feature = "gpu"))]
+    fn gpu(&self, _: f64, _: f64, _: f64) -> Result<Candidate> {
+        Err(super::exact::no_gpu())
+    }
+
     fn planes(&self) -> Option<Candidate> {
         if self.settings.cull != Cull::Soft {
             return None;
         }
-        let met = planes::met(&self.optics, self.grid, self.sources);
-        let HologramSettings { error, memory, .. } = *self.settings;
-        let (parameters, cost) = Parameters::choose(&self.optics, self.grid, &met, error, memory)?;
+        let cloud = Cloud::new(&self.optics, self.grid, self.sources);
+        let (error, memory) = (self.settings.error, self.memory);
+        let (parameters, cost) = Parameters::choose(&self.optics, self.grid, &cloud, error, memory)?;
         Some(Candidate {
             method: Method::Planes,
             engine: Engine::Planes(parameters),
             core_seconds: cost * set_factor(self.settings, Method::Planes),
-            error: parameters.error(&self.optics, &met, planes::steepness(&self.optics, self.grid, &met)),
-            memory: parameters.bytes(&self.optics, self.grid, &met),
+            error: parameters.error(&self.optics, &cloud),
+            memory: parameters.bytes(&self.optics, self.grid, &cloud),
             words: format!("{} planes, rank {}", parameters.planes, parameters.rank),
         })
     }
@@ -91,7 +162,7 @@ impl Job<'_> {
             engine: Engine::Oracle,
             core_seconds: pairs * ORACLE_PAIR,
             error: ORACLE_ERROR,
-            memory: 24 * self.sources.len() as u64 + 16 * self.grid.len() as u64,
+            memory: oracle::bytes(self.grid, &self.optics, self.settings.cull, self.sources.iter().map(|s| s.distance)),
             words: "double precision, term by term".to_owned(),
         }
     }
@@ -100,9 +171,9 @@ impl Job<'_> {
 /// Slowness against AVX-512, measured.
 fn set_factor(settings: &HologramSettings, method: Method) -> f64 {
     match (settings.instruction_set.unwrap_or_else(InstructionSet::detect), method) {
-        (InstructionSet::Avx512, _) | (_, Method::Oracle) => 1.0,
+        (InstructionSet::Avx512, _) | (_, Method::Oracle | Method::Gpu) => 1.0,
         (InstructionSet::Avx2, _) => 1.3,
-        (InstructionSet::Portable, Method::Direct) => 5.5,
+        (InstructionSet::Portable, Method::Direct | Method::Recurrence) => 5.5,
         (InstructionSet::Portable, Method::Tiles) => 9.5,
         (InstructionSet::Portable, Method::Planes) => 4.0,
     }
@@ -124,20 +195,26 @@ pub fn plan(points: &[PointSource], grid: &Grid, wavelength: f64, settings: &Hol
     }
     let sources = sources(points)?;
     let pairs = Coverage::of(points.len(), &sources, grid, &optics, settings.cull).pairs;
-    let job = Job { optics, grid, sources: &sources, settings };
-    let (best, reason) = match settings.method {
+    let own = (size_of::<Source>() * sources.len()) as u64;
+    let job = Job { optics, grid, sources: &sources, settings, memory: settings.memory.saturating_sub(own) };
+    let threads = rayon::current_num_threads() as f64;
+    let (mut best, reason) = match settings.method {
         Some(method) => {
             let candidate = match method {
                 Method::Oracle => job.oracle(pairs),
                 Method::Direct => job.exact(method, DIRECT_ERROR),
                 Method::Tiles => job.exact(method, error),
                 Method::Planes => job.planes().ok_or_else(|| refuse_planes(settings))?,
+                Method::Gpu => job.gpu(error, pairs, threads)?,
+                Method::Recurrence => job.recurrence(error, pairs),
             };
             let reason = format!("{} as asked for", candidate.words);
             (candidate, reason)
         }
-        None => choose(&job, error)?,
+        None => choose(&job, error, pairs, threads)?,
     };
+    // The points as the engines take them.
+    best.memory += own;
     if best.memory > settings.memory {
         let hint = "give more memory, a smaller panel or fewer points".to_owned();
         let (needed, budget) = (best.memory.div_ceil(1 << 20), settings.memory >> 20);
@@ -146,7 +223,7 @@ pub fn plan(points: &[PointSource], grid: &Grid, wavelength: f64, settings: &Hol
     Ok(Plan {
         method: best.method,
         reason,
-        seconds: best.core_seconds / rayon::current_num_threads() as f64,
+        seconds: best.core_seconds / threads,
         error: best.error,
         memory: best.memory,
         instruction_set: set,
@@ -164,19 +241,25 @@ fn refuse_planes(settings: &HologramSettings) -> Error {
 }
 
 /// The fastest that keeps error and memory, and why.
-fn choose(job: &Job, error: f64) -> Result<(Candidate, String)> {
+fn choose(job: &Job, error: f64, pairs: f64, threads: f64) -> Result<(Candidate, String)> {
     let mut candidates = vec![job.exact(Method::Direct, DIRECT_ERROR)];
     if error > DIRECT_ERROR {
         candidates.push(job.exact(Method::Tiles, error));
     }
     candidates.extend(job.planes());
+    // Opening a graphics processor takes a quarter of a second: only for jobs that are worth it.
+    let quickest = candidates.iter().map(|c| c.core_seconds / threads).fold(f64::INFINITY, f64::min);
+    if quickest > GPU_WORTH && has_hardware_gpu() {
+        candidates.extend(job.gpu(error, pairs, threads).ok());
+    }
     candidates.sort_by(|a, b| a.core_seconds.total_cmp(&b.core_seconds));
     let others: Vec<String> =
         candidates.iter().map(|c| format!("{} {:.2e} core-seconds", c.method.name(), c.core_seconds)).collect();
-    let fits = |c: &Candidate| c.memory <= job.settings.memory && (c.error <= error || c.method == Method::Direct);
+    let fits = |c: &Candidate| c.memory <= job.memory && (c.error <= error || c.method == Method::Direct);
     let Some(best) = candidates.iter().position(fits) else {
         let least = candidates.iter().min_by_key(|c| c.memory);
-        let needed = least.map_or(0, |c| c.memory.div_ceil(1 << 20));
+        let beside = job.settings.memory - job.memory;
+        let needed = least.map_or(0, |c| (c.memory + beside).div_ceil(1 << 20));
         let hint = "give more memory, a smaller panel or fewer points".to_owned();
         return Err(Error::Memory { what: "hologram", needed, budget: job.settings.memory >> 20, hint });
     };

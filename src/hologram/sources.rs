@@ -5,6 +5,7 @@ use super::definition::Optics;
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::points::PointSource;
+use rayon::prelude::*;
 
 /// A point that shines.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +35,7 @@ impl Source {
         let spans = self.span(grid);
         [0, 1].map(|axis| {
             spans[axis].map(|d| {
-                let r = d.hypot(self.distance);
+                let r = (d * d + self.distance * self.distance).sqrt();
                 if r > 0.0 { (d / r).clamp(-limit[axis], limit[axis]) } else { 0.0 }
             })
         })
@@ -42,12 +43,15 @@ impl Source {
 }
 
 /// Root mean square of sin θ_x·sin θ_y over the pixels that the sources light: what errors of separable forms go with.
-pub(crate) fn tilt<'a>(sources: impl ExactSizeIterator<Item = &'a Source>, grid: &Grid, limit: [f64; 2]) -> f64 {
-    let count = sources.len().max(1) as f64;
+pub(crate) fn tilt(sources: &[Source], grid: &Grid, limit: [f64; 2]) -> f64 {
     let square = |[low, high]: [f64; 2]| (low * low + low * high + high * high) / 3.0;
-    let sum: f64 = sources.map(|s| s.sines(grid, limit).map(square).iter().product::<f64>()).sum();
-    (sum / count).sqrt()
+    let one = |s: &Source| s.sines(grid, limit).map(square).iter().product::<f64>();
+    let parts: Vec<f64> = sources.par_chunks(PART).map(|part| part.iter().map(one).sum()).collect();
+    (parts.iter().sum::<f64>() / sources.len().max(1) as f64).sqrt()
 }
+
+/// Sources that one task sums over: fixed, so that sums do not depend on the number of threads.
+const PART: usize = 4096;
 
 /// Checks points and leaves out those of amplitude zero; refuses what is not finite, naming the point.
 pub(crate) fn sources(points: &[PointSource]) -> Result<Vec<Source>> {
@@ -97,9 +101,7 @@ impl Coverage {
             [grid.x(0) - 0.5 * grid.pitch_x, grid.x(grid.width - 1) + 0.5 * grid.pitch_x],
             [grid.y(grid.height - 1) - 0.5 * grid.pitch_y, grid.y(0) + 0.5 * grid.pitch_y],
         ];
-        let mut coverage = Self { points, dark: points - sources.len(), ..Self::default() };
-        let (mut inside, mut all) = (0.0, 0.0);
-        for source in sources {
+        let one = |source: &Source| {
             let power = source.amplitude * source.amplitude;
             let (mut part, mut pixels) = (1.0, 1.0);
             for (axis, position) in [source.x, source.y].into_iter().enumerate() {
@@ -111,16 +113,19 @@ impl Coverage {
                     if cull == Cull::None { (high - low) / optics.pitch[axis] } else { span / optics.pitch[axis] };
                 let middle = optics.taper[axis].middle;
                 let frequency = |d: f64| {
-                    let r = d.hypot(source.distance);
+                    let r = (d * d + source.distance * source.distance).sqrt();
                     if r > 0.0 { (d / (r * optics.wavelength)).clamp(-middle, middle) } else { 0.0 }
                 };
                 part *= (frequency(high) - frequency(low)) / (2.0 * middle);
             }
-            all += power;
-            inside += power * part;
-            coverage.pairs += pixels;
-            coverage.unreached += usize::from(pixels == 0.0);
-        }
+            [power, power * part, pixels, f64::from(u8::from(pixels == 0.0))]
+        };
+        let add = |a: [f64; 4], b: [f64; 4]| std::array::from_fn(|i| a[i] + b[i]);
+        let parts: Vec<[f64; 4]> =
+            sources.par_chunks(PART).map(|part| part.iter().map(one).fold([0.0; 4], add)).collect();
+        let [all, inside, pairs, unreached] = parts.into_iter().fold([0.0; 4], add);
+        let unreached = unreached as usize;
+        let mut coverage = Self { points, dark: points - sources.len(), unreached, pairs, light_outside: 0.0 };
         coverage.light_outside = if all > 0.0 { (1.0 - inside / all).clamp(0.0, 1.0) } else { 0.0 };
         coverage
     }

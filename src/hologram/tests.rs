@@ -1,10 +1,10 @@
 //! Engines against the oracle, as complex fields.
 
 use super::*;
-use crate::error::Error;
 use crate::field::relative_error;
 use crate::random::Random;
 use glam::DVec3;
+use std::time::Duration;
 
 /// A cloud over `extent` about `center` with z in `z`; random phases, or those of one smooth surface.
 fn cloud(n: usize, center: [f64; 2], extent: [f64; 2], z: [f64; 2], smooth: bool) -> Vec<PointSource> {
@@ -95,7 +95,8 @@ fn planes_keep_the_error_that_they_state() {
                     set.name(),
                     got.report.error_bound
                 );
-                assert!(found < error, "{name} {error:.0e} {}: {found:.2e}", set.name());
+                let kept = found < error && found < got.report.error_bound;
+                assert!(kept, "{name} {error:.0e} {}: {found:.2e}", set.name());
             }
         }
     }
@@ -145,31 +146,182 @@ fn any_number_of_threads_gives_the_same_bits() {
     }
 }
 
-#[test]
-fn a_job_stops_when_asked_and_bad_input_is_refused() {
-    let grid = Grid::new(1920, 1080, 8e-6, 8e-6).expect("grid");
-    let points = cloud(20_000, [0.0; 2], [0.01; 2], [-0.2, -0.25], false);
-    let plan_of = |settings: &HologramSettings| plan(&points, &grid, WAVELENGTH, settings);
-    let whole = plan_of(&settings(Method::Direct, 1e-3, InstructionSet::detect())).expect("plan");
+/// Delay from the request to stop, made `after` the start, to the job's end [s]; `None` where it had ended before.
+///
+/// In threads of its own: those of the other tests finish their tasks first.
+fn stopping_delay(points: &[PointSource], grid: &Grid, plan: &Plan, after: Duration) -> Option<f64> {
     let progress = Progress::new();
-    let late = std::thread::scope(|scope| {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("pool");
+    std::thread::scope(|scope| {
         let job = scope.spawn(|| {
-            let result = compute(&points, &grid, WAVELENGTH, &whole, &progress);
+            let result = pool.install(|| compute(points, grid, WAVELENGTH, plan, &progress));
             (result.map(|_| ()), Instant::now())
         });
-        std::thread::sleep(std::time::Duration::from_millis(150));
+        std::thread::sleep(after);
         let asked = Instant::now();
         progress.stop();
         let (result, ended) = job.join().expect("thread");
-        assert!(matches!(result, Err(Error::Interrupted)));
-        ended.duration_since(asked).as_secs_f64()
-    });
-    // 50 ms is the promise; ten times that is left for a machine that is busy with other tests.
-    assert!(late < 0.5, "stopped after {late} s");
-    for error in [0.0, 1.0, f64::NAN, -1e-3] {
-        assert!(plan_of(&HologramSettings { error, ..HologramSettings::default() }).is_err());
+        matches!(result, Err(Error::Interrupted)).then(|| ended.duration_since(asked).as_secs_f64())
+    })
+}
+
+#[test]
+fn every_engine_stops_within_50_ms() {
+    let grid = Grid::new(3840, 2160, 3.74e-6, 3.74e-6).expect("grid");
+    let far = cloud(300_000, [0.0; 2], [0.012, 0.007], [-0.10, -0.15], false);
+    let near = cloud(2_000, [0.0; 2], [0.012, 0.007], [-4e-3, 3e-3], false);
+    let one = vec![far[0]; 300_000];
+    let jobs = [
+        (Method::Direct, &far),
+        (Method::Tiles, &far),
+        (Method::Planes, &far),
+        (Method::Planes, &one),
+        (Method::Direct, &near),
+        (Method::Planes, &near),
+        (Method::Oracle, &far),
+        (Method::Oracle, &near),
+    ];
+    let mut slow = Vec::new();
+    for (i, (method, points)) in jobs.into_iter().enumerate() {
+        let plan = plan(points, &grid, WAVELENGTH, &settings(method, 1e-3, InstructionSet::detect())).expect("plan");
+        for after in [1, 20, 60, 150, 400] {
+            // Other tests keep the cores busy: the best of three is the engine's own delay.
+            let delays = (0..3).map_while(|_| stopping_delay(points, &grid, &plan, Duration::from_millis(after)));
+            let Some(best) = delays.min_by(f64::total_cmp) else { continue };
+            println!("{method:?} {i} asked after {after} ms stopped {:.1} ms later", best * 1e3);
+            if best > 0.05 {
+                slow.push(format!("{method:?} {i} after {after} ms: {best:.3} s"));
+            }
+        }
     }
-    let tight = HologramSettings { memory: 1000, ..HologramSettings::default() };
-    assert!(matches!(plan_of(&tight), Err(Error::Memory { .. })));
+    assert!(slow.is_empty(), "{slow:?}");
+}
+
+#[test]
+fn a_budget_of_memory_is_kept_or_the_job_is_refused_with_the_numbers() {
+    let grid = Grid::new(960, 540, 8e-6, 8e-6).expect("grid");
+    let points = cloud(3_000, [0.0; 2], [7e-3, 4e-3], [-0.2, -0.25], false);
+    for method in [None, Some(Method::Direct), Some(Method::Tiles), Some(Method::Planes), Some(Method::Oracle)] {
+        let mut refused = 0;
+        for megabytes in [1u64, 4, 16, 64, 256, 1024] {
+            let settings = HologramSettings { method, memory: megabytes << 20, ..HologramSettings::default() };
+            match plan(&points, &grid, WAVELENGTH, &settings) {
+                Ok(plan) => assert!(plan.memory <= settings.memory, "{method:?} {megabytes} MB: {}", plan.memory),
+                Err(Error::Memory { needed, budget, .. }) => {
+                    assert!(budget == megabytes && needed > megabytes, "{needed} MB over {budget} MB");
+                    refused += 1;
+                }
+                Err(other) => panic!("{other}"),
+            }
+        }
+        assert!((1..6).contains(&refused), "{method:?} refused {refused} of six budgets");
+    }
+}
+
+#[test]
+fn bad_settings_are_refused() {
+    let grid = Grid::new(1920, 1080, 8e-6, 8e-6).expect("grid");
+    let points = cloud(20, [0.0; 2], [0.01; 2], [-0.2, -0.25], false);
+    for error in [0.0, 1.0, f64::NAN, -1e-3] {
+        let settings = HologramSettings { error, ..HologramSettings::default() };
+        assert!(plan(&points, &grid, WAVELENGTH, &settings).is_err());
+    }
     assert!(plan(&points, &grid, -1.0, &HologramSettings::default()).is_err());
+}
+
+/// The adapter, or `None` where the machine has none and none is required; says so.
+fn adapter() -> Option<&'static str> {
+    match gpu_adapter() {
+        Ok(name) => Some(name),
+        Err(why) => {
+            assert!(std::env::var_os("HOLODRIVE_REQUIRE_DISPLAY").is_none_or(|v| v != "1"), "{why}");
+            println!("not run: {why}");
+            None
+        }
+    }
+}
+
+#[test]
+fn gpu_equals_the_oracle() {
+    let Some(adapter) = adapter() else { return };
+    let set = InstructionSet::detect();
+    let grid = panel();
+    for smooth in [false, true] {
+        for (name, points) in clouds(smooth) {
+            let exact = oracle(&points, &grid, WAVELENGTH, Cull::Soft).expect("oracle");
+            let got = field(&points, &grid, &settings(Method::Gpu, 1e-3, set));
+            let found = relative_error(&got.field.samples, &exact.samples);
+            println!("{adapter} {name} smooth={smooth}: {found:.2e}, bound {:.2e}", got.report.error_bound);
+            assert!(found < 1e-3 && found < got.report.error_bound, "{name}: {found:.2e}");
+        }
+    }
+    // Several cells, wide angles (each pixel from its own path), and the other cuts.
+    let wide = Grid::new(301, 275, 1e-6, 1.25e-6).expect("grid").centered_at([1e-3, 0.4e-3]);
+    let points = cloud(20, [0.2e-3, 0.0], [3e-3, 3e-3], [-5e-3, -10e-3], false);
+    for (grid, cull, error) in [(wide, Cull::Soft, 1.5e-4), (grid, Cull::Hard, 1e-3), (wide, Cull::None, 1e-3)] {
+        let exact = oracle(&points, &grid, WAVELENGTH, cull).expect("oracle");
+        let got = field(&points, &grid, &HologramSettings { cull, ..settings(Method::Gpu, error, set) });
+        let found = relative_error(&got.field.samples, &exact.samples);
+        println!("{adapter} {cull:?}: {found:.2e}, bound {:.2e}", got.report.error_bound);
+        assert!(found < 1e-3, "{cull:?}: {found:.2e}");
+    }
+}
+
+#[test]
+fn gpu_stops_when_asked_and_is_never_chosen_where_it_is_the_cpu() {
+    let Some(adapter) = adapter() else { return };
+    let grid = Grid::new(1920, 1080, 8e-6, 8e-6).expect("grid");
+    let points = cloud(20_000, [0.0; 2], [0.012, 0.007], [-0.2, -0.25], false);
+    let plan_of = |settings: &HologramSettings| plan(&points, &grid, WAVELENGTH, settings).expect("plan");
+    let gpu = plan_of(&settings(Method::Gpu, 1e-3, InstructionSet::detect()));
+    let delays = (0..3).map_while(|_| stopping_delay(&points, &grid, &gpu, Duration::from_millis(300)));
+    if let Some(best) = delays.min_by(f64::total_cmp) {
+        println!("{adapter}: stopped {:.1} ms later", best * 1e3);
+        assert!(best < 0.2, "{best} s");
+    }
+    if adapter.contains("llvmpipe") {
+        let settings = HologramSettings { cull: Cull::None, ..HologramSettings::default() };
+        assert_ne!(plan_of(&settings).method, Method::Gpu);
+    }
+}
+
+#[test]
+fn the_difference_method_keeps_the_error_that_it_states() {
+    let grid = panel();
+    for (name, points) in clouds(false) {
+        let exact = oracle(&points, &grid, WAVELENGTH, Cull::Soft).expect("oracle");
+        for set in InstructionSet::available() {
+            for error in [1e-2, 1e-3] {
+                let got = field(&points, &grid, &settings(Method::Recurrence, error, set));
+                let (found, bound) = (relative_error(&got.field.samples, &exact.samples), got.report.error_bound);
+                println!("{name} {} {error:.0e}: {found:.2e}, bound {bound:.2e}, {}", set.name(), got.report.reason);
+                assert!(found < bound && bound < 1.1 * error, "{name} {error:.0e}: {found:.2e}, bound {bound:.2e}");
+            }
+        }
+    }
+    let points = cloud(30, [0.4e-3, -0.3e-3], [3e-3, 3e-3], [-0.05, -0.2], false);
+    let exact = oracle(&points, &grid, WAVELENGTH, Cull::Hard).expect("oracle");
+    let settings =
+        HologramSettings { cull: Cull::Hard, ..settings(Method::Recurrence, 1e-3, InstructionSet::detect()) };
+    let got = field(&points, &grid, &settings);
+    assert!(relative_error(&got.field.samples, &exact.samples) < 1e-3);
+}
+
+#[test]
+fn passes_refine_to_the_whole_field() {
+    let grid = Grid::new(151, 95, 8e-6, 6.5e-6).expect("grid");
+    let points = cloud(4_000, [0.0; 2], [3e-3, 2e-3], [-0.2, -0.25], false);
+    let wanted = HologramSettings { memory: 4 << 30, ..HologramSettings::default() };
+    let exact = oracle(&points, &grid, WAVELENGTH, Cull::Soft).expect("oracle");
+    let mut energies = Vec::new();
+    let show = |field: &Field, gain: f32| energies.push(field.energy() * f64::from(gain * gain));
+    let progress = Progress::new();
+    let got = compute_progressively(&points, &grid, WAVELENGTH, &wanted, 4, &progress, show).expect("field");
+    let error = relative_error(&got.field.samples, &exact.samples);
+    println!("four passes: {error:.2e}, bound {:.2e}", got.report.error_bound);
+    assert!(error < 1e-3 && got.report.coverage.points == 4_000);
+    // The first pass has 63 points: their energy is the whole's to about one in √63.
+    assert_eq!(energies.len(), 4);
+    assert!(energies.iter().all(|e| (e / energies[3] - 1.0).abs() < 0.4), "{energies:?}");
+    assert!(compute_progressively(&points, &grid, WAVELENGTH, &wanted, 0, &progress, |_, _| ()).is_err());
 }

@@ -7,8 +7,13 @@
 //! 17, 19662 (2009), eqs. 13 and 21). Frequencies outside carry waves that miss the output window and are dropped.
 //!
 //! The padding is input + output size, so that nothing wraps round. The phase 2πf_z·d is reduced to one turn in f64.
+//!
+//! [`Propagator`] goes between windows of one pitch, anywhere beside each other; [`ScaledPropagator`] onto any pitch.
 
 pub mod oracle;
+mod scaled;
+
+pub use scaled::{ScaledPropagator, propagate_scaled};
 
 use crate::error::{Error, Result};
 use crate::field::{Complex, Fft2, Field, Grid};
@@ -175,19 +180,22 @@ impl<T: FftNum> Propagator<T> {
     /// The kernel is needed for offsets X between output and input points; its local frequency at X is
     /// X/(λ√(X² + d²)). Centred windows give Matsushima & Shimobaba's symmetric limits, shifted ones their 2010 ones.
     fn bands(&self, wavelength: f64, distance: f64) -> [[f64; 2]; 2] {
-        let band = |middle: f64, length: f64| {
-            let at = |x: f64| x / (wavelength * x.hypot(distance)) * if distance < 0.0 { -1.0 } else { 1.0 };
-            let ends = [at(middle - 0.5 * length), at(middle + 0.5 * length)];
-            [ends[0].min(ends[1]), ends[0].max(ends[1])]
-        };
-        if distance == 0.0 {
-            return [[f64::NEG_INFINITY, f64::INFINITY]; 2];
-        }
         [
-            band(self.output.center[0] - self.input.center[0], self.padded.extent_x()),
-            band(self.output.center[1] - self.input.center[1], self.padded.extent_y()),
+            band(wavelength, distance, self.output.center[0] - self.input.center[0], self.padded.extent_x()),
+            band(wavelength, distance, self.output.center[1] - self.input.center[1], self.padded.extent_y()),
         ]
     }
+}
+
+/// Lowest and highest frequency along one axis [cycles/m] for windows whose middles are `middle` apart, sampled over a
+/// period of `length` [m].
+pub(crate) fn band(wavelength: f64, distance: f64, middle: f64, length: f64) -> [f64; 2] {
+    if distance == 0.0 {
+        return [f64::NEG_INFINITY, f64::INFINITY];
+    }
+    let at = |x: f64| x / (wavelength * x.hypot(distance)) * if distance < 0.0 { -1.0 } else { 1.0 };
+    let ends = [at(middle - 0.5 * length), at(middle + 0.5 * length)];
+    [ends[0].min(ends[1]), ends[0].max(ends[1])]
 }
 
 /// Turns of exp(+i2πf_z·d) and the factor by which an evanescent wave decays.

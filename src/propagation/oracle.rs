@@ -16,15 +16,36 @@ pub fn propagate(field: &Field<f64>, distance: f64, output: Grid) -> Result<Fiel
         return Err(Error::parameter("output", "the oracle takes windows of one middle and one pitch"));
     }
     let wavelength = field.wavelength;
-    let tau = std::f64::consts::TAU;
-    let (width, height) = (input.width + output.width, input.height + output.height);
-    let limit = |length: f64| 1.0 / (wavelength * (2.0 * distance / length).hypot(1.0));
-    let frequencies = |count: usize, pitch: f64| -> Vec<f64> {
-        let length = count as f64 * pitch;
-        (0..count).map(|k| (k as f64 - (count / 2) as f64) / length).filter(|f| f.abs() <= limit(length)).collect()
+    // The wave of frequency f reaches the offset X = d·λf/√(1 − λ²f²).
+    let inside = |axis: usize, f: f64| {
+        let length = [
+            (input.width + output.width) as f64 * input.pitch_x,
+            (input.height + output.height) as f64 * input.pitch_y,
+        ];
+        f64::from(u8::from(f.abs() <= 1.0 / (wavelength * (2.0 * distance / length[axis]).hypot(1.0))))
     };
-    let fxs = frequencies(width, input.pitch_x);
-    let fys = frequencies(height, input.pitch_y);
+    Ok(onto(field, distance, output, [input.width + output.width, input.height + output.height], inside))
+}
+
+/// The same onto a window of any pitch and middle, with the given numbers of frequencies, spaced by 1/(number × input
+/// pitch), of which each has a weight along x (axis 0) and y (axis 1).
+pub fn onto(
+    field: &Field<f64>,
+    distance: f64,
+    output: Grid,
+    [width, height]: [usize; 2],
+    weight: impl Fn(usize, f64) -> f64,
+) -> Field<f64> {
+    let input = field.grid;
+    let wavelength = field.wavelength;
+    let tau = std::f64::consts::TAU;
+    let frequencies = |axis: usize, count: usize, pitch: f64| -> Vec<f64> {
+        let length = count as f64 * pitch;
+        let all = (0..count).map(|k| (k as f64 - (count / 2) as f64) / length);
+        all.filter(|&f| weight(axis, f) > 0.0).collect()
+    };
+    let fxs = frequencies(0, width, input.pitch_x);
+    let fys = frequencies(1, height, input.pitch_y);
     // Rows first: spectrum over x of every input row, then over y, times the transfer, and back the same way.
     let mut spectrum = vec![Complex64::default(); fxs.len() * fys.len()];
     for (kx, &fx) in fxs.iter().enumerate() {
@@ -40,7 +61,8 @@ pub fn propagate(field: &Field<f64>, distance: f64, output: Grid) -> Result<Fiel
                 rows.iter().enumerate().map(|(row, u)| u * Complex64::cis(-tau * fy * input.y(row))).sum();
             let fz2 = 1.0 / (wavelength * wavelength) - fx * fx - fy * fy;
             let transfer = if fz2 >= 0.0 { Complex64::cis(tau * distance * fz2.sqrt()) } else { Complex64::default() };
-            spectrum[ky * fxs.len() + kx] = sum * transfer / (width * height) as f64;
+            let part = weight(0, fx) * weight(1, fy) / (width * height) as f64;
+            spectrum[ky * fxs.len() + kx] = sum * transfer * part;
         }
     }
     let mut out = Field::<f64>::zeros(output, wavelength);
@@ -58,5 +80,5 @@ pub fn propagate(field: &Field<f64>, distance: f64, output: Grid) -> Result<Fiel
                 fxs.iter().zip(&columns).map(|(&fx, u)| u * Complex64::cis(tau * fx * output.x(column))).sum();
         }
     }
-    Ok(out)
+    out
 }

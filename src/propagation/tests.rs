@@ -232,3 +232,140 @@ fn single_precision_holds_1e_6_at_full_size_and_every_distance() {
         assert!(error < 1e-6, "{distance} m: {error}");
     }
 }
+
+#[test]
+fn scaled_and_shifted_windows_are_the_oracle() {
+    for (size, out_size, pitch, out_pitch, middle, distance) in [
+        ((37, 20), (23, 31), (8e-6, 8e-6), (11e-6, 5e-6), (1e-4, -2e-4), 0.004),
+        ((24, 31), (40, 15), (3e-6, 4.5e-6), (1e-6, 9e-6), (-3e-4, 4e-4), 0.002),
+        ((30, 17), (21, 44), (8e-6, 6e-6), (20e-6, 2e-6), (5e-4, 3e-4), -0.003),
+        ((16, 16), (9, 7), (0.4e-6, 0.5e-6), (0.3e-6, 0.9e-6), (2e-6, -3e-6), 0.00001),
+        ((19, 23), (1, 1), (8e-6, 6e-6), (8e-6, 6e-6), (3e-5, 0.0), 0.05),
+    ] {
+        let grid = Grid::new(size.0, size.1, pitch.0, pitch.1).expect("grid").centered_at([1e-4, -2e-4]);
+        let output = Grid::new(out_size.0, out_size.1, out_pitch.0, out_pitch.1)
+            .expect("grid")
+            .centered_at([1e-4 + middle.0, -2e-4 + middle.1]);
+        let field = noise(grid, 532e-9);
+        let planned = ScaledPropagator::new(grid, output, 532e-9, distance, Settings::default()).expect("plan");
+        // The highest frequency of an even number has no sign, and is left out.
+        let nyquist = [0.499_999 / pitch.0, 0.499_999 / pitch.1];
+        let weight = |axis: usize, f: f64| if f.abs() > nyquist[axis] { 0.0 } else { planned.weight(axis, f) };
+        let expected = oracle::onto(&field, distance, output, planned.counts(), weight);
+        let fast = planned.propagate(&field, &Progress::new()).expect("fast");
+        let error = relative_error(&fast.samples, &expected.samples);
+        assert!(error < 1e-10, "{size:?} → {out_size:?} over {distance} m: {error}");
+        let single = propagate_scaled(&field.to_f32(), distance, output, &Progress::new()).expect("single");
+        let error = relative_error(&single.samples, &expected.samples);
+        // Three transforms more than an inverse one, and of the noise only what meets the window.
+        assert!(error < 6e-6, "{size:?} → {out_size:?} over {distance} m in f32: {error}");
+    }
+}
+
+#[test]
+fn a_gaussian_beam_on_image_planes_of_other_pitches() {
+    let grid = Grid::new(211, 190, 8e-6, 9e-6).expect("grid");
+    let (wavelength, w0, z) = (633e-9, 120e-6, 0.3);
+    let beam = gaussian(grid, wavelength, w0, 0.0, [30e-6, -50e-6]);
+    // 0.3 m on the beam is 0.52 mm wide: a coarse window that sees all of it, and a fine one at its shoulder.
+    let wide = Grid::new(181, 155, 25e-6, 30e-6).expect("grid").centered_at([1e-4, 0.0]);
+    let fine = Grid::new(75, 41, 2.5e-6, 3e-6).expect("grid").centered_at([0.45e-3, -0.3e-3]);
+    for output in [wide, fine] {
+        let out = propagate_scaled(&beam, z, output, &Progress::new()).expect("out");
+        let expected = gaussian(output, wavelength, w0, z, [30e-6, -50e-6]);
+        let error = relative_error(&out.samples, &expected.samples);
+        println!("beam onto {} µm: {error:.2e}", output.pitch_x * 1e6);
+        // Paraxial formula: k·z·θ⁴/8 = 3e-6 rad at θ = λ/(πw0).
+        assert!(error < 2e-5, "{error}");
+    }
+    // Energy: samples stand for pitch_x·pitch_y of area each.
+    let out = propagate_scaled(&beam, z, wide, &Progress::new()).expect("out");
+    let energy = |f: &Field<f64>| f.samples.iter().map(|u| u.norm_sqr()).sum::<f64>() * f.grid.pitch_x * f.grid.pitch_y;
+    assert!((energy(&out) / energy(&beam) - 1.0).abs() < 1e-6, "{}", energy(&out) / energy(&beam));
+}
+
+#[test]
+fn there_and_back_in_band_is_exact() {
+    // The beam stays inside both windows and the band: nothing is lost but by rounding.
+    let grid = Grid::new(201, 180, 8e-6, 7e-6).expect("grid");
+    let beam = gaussian(grid, 633e-9, 90e-6, 0.0, [20e-6, 30e-6]);
+    for distance in [0.005, 0.02] {
+        let there = propagate(&beam, distance, &Progress::new()).expect("there");
+        let back = propagate(&there, -distance, &Progress::new()).expect("back");
+        let error = relative_error(&back.samples, &beam.samples);
+        println!("there and back over {distance} m: {error:.2e}");
+        assert!(error < 1e-9, "{error}");
+        let single = propagate(&beam.to_f32(), distance, &Progress::new()).expect("there");
+        let single = propagate(&single, -distance, &Progress::new()).expect("back");
+        assert!(relative_error(&single.samples, &beam.samples) < 2e-6);
+        let energy = |f: &Field<f64>| f.samples.iter().map(|u| u.norm_sqr()).sum::<f64>();
+        assert!((energy(&there) / energy(&beam) - 1.0).abs() < 1e-10);
+        // Onto another pitch and back.
+        let middle = Grid::new(160, 170, 11e-6, 9e-6).expect("grid").centered_at([10e-6, -5e-6]);
+        let there = propagate_scaled(&beam, distance, middle, &Progress::new()).expect("there");
+        let back = propagate_scaled(&there, -distance, grid, &Progress::new()).expect("back");
+        let error = relative_error(&back.samples, &beam.samples);
+        println!("there and back over {distance} m on 11 µm: {error:.2e}");
+        assert!(error < 1e-6, "{error}");
+    }
+}
+
+#[test]
+fn a_circular_aperture_on_its_axis_gives_the_exact_closed_form() {
+    // Behind a disc of radius a in a plane wave, on the axis, Rayleigh–Sommerfeld's first integral is done exactly:
+    // u = e^{ikz} − z/√(z² + a²)·e^{ik√(z² + a²)}; Fresnel numbers N = a²/(λz) give |u|² ≈ 4 sin²(πN/2).
+    let (wavelength, radius, pitch) = (633e-9, 0.4e-3, 4e-6);
+    let grid = Grid::new(221, 221, pitch, pitch).expect("grid");
+    let mut field = Field::<f64>::zeros(grid, wavelength);
+    for row in 0..grid.height {
+        for column in 0..grid.width {
+            // Part of the pixel inside the disc.
+            let parts = 32;
+            let at = |i: usize| ((i as f64 + 0.5) / parts as f64 - 0.5) * pitch;
+            let inside = (0..parts * parts)
+                .filter(|i| (grid.x(column) + at(i % parts)).hypot(grid.y(row) + at(i / parts)) < radius)
+                .count();
+            field.samples[row * grid.width + column] = Complex64::new(inside as f64 / (parts * parts) as f64, 0.0);
+        }
+    }
+    let k = TAU / wavelength;
+    for number in [1.0, 1.5, 2.0, 2.5, 3.0] {
+        let z = radius * radius / (wavelength * number);
+        let point = Grid::new(1, 1, pitch, pitch).expect("grid");
+        let out = propagate_scaled(&field, z, point, &Progress::new()).expect("out");
+        let r = z.hypot(radius);
+        let expected = Complex64::cis(k * z) - Complex64::cis(k * r) * (z / r);
+        println!("N = {number}: {:.4} for {:.4}", out.samples[0].norm(), expected.norm());
+        // The edge's wave comes under sin = a/z and is lowered by the pixels' sinc: (πaθ/λ·pitch/a)²/6 ≤ 1e-3; the
+        // window of the aperture's plane ends the spectrum at 1/(2·pitch).
+        assert!((out.samples[0] - expected).norm() < 6e-3, "N = {number}: {} {expected}", out.samples[0]);
+    }
+}
+
+#[test]
+fn talbot_images_under_an_envelope_are_the_sum_of_three_beams() {
+    // (1 + cos(2πx/p)) under a Gaussian: three beams, of which the side ones run aside by λz/p and turn by πλz/p².
+    // At half the Talbot length that turn is π: the image is the grating's negative.
+    let (wavelength, period, w0) = (633e-9, 128e-6, 1.2e-3);
+    let tall = Grid::new(1200, 61, 8e-6, 0.2e-3).expect("grid");
+    let z = period * period / wavelength;
+    let beam = |z: f64| {
+        let mut field = Field::<f64>::zeros(tall, wavelength);
+        for (order, weight) in [(-1.0, 0.5), (0.0, 1.0), (1.0, 0.5)] {
+            let (f, aside) = (order / period, order * wavelength * z / period);
+            let one = gaussian(tall, wavelength, w0, z, [aside, 0.0]);
+            for (i, (u, g)) in field.samples.iter_mut().zip(&one.samples).enumerate() {
+                let x = tall.x(i % tall.width);
+                *u += g * Complex64::cis(TAU * f * x - std::f64::consts::PI * wavelength * z * f * f) * weight;
+            }
+        }
+        field
+    };
+    let out = propagate(&beam(0.0), z, &Progress::new()).expect("half Talbot");
+    let error = relative_error(&out.samples, &beam(z).samples);
+    println!("half Talbot length: {error:.2e}");
+    assert!(error < 2e-4, "{error}");
+    // On the axis the grating is bright, half a Talbot length on it is dark.
+    let middle = 30 * 1200 + 600;
+    assert!(beam(0.0).samples[middle].norm() > 1.9 && out.samples[middle].norm() < 0.05);
+}

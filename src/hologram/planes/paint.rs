@@ -5,6 +5,7 @@
 //! sum does not depend on the number of threads.
 
 use super::table::Table;
+use crate::error::Result;
 use crate::field::Complex32;
 use crate::hologram::lanes::{Aligned, InstructionSet, Lanes, dispatch};
 use crate::progress::Progress;
@@ -15,6 +16,9 @@ const GROUP: usize = 3;
 
 /// Side of a bin [px].
 pub(super) const BIN: usize = 64;
+
+/// Most dabs of one patch: a crowded bin is shared among threads, and f32 sums of more terms lose digits.
+const LARGEST: usize = 4096;
 
 /// Patches that are painted before they are added.
 const WAVE: usize = 64;
@@ -64,26 +68,34 @@ struct Patch {
     im: Aligned,
 }
 
-/// Paints dabs, which must lie on the canvas with their whole kernels; false when asked to stop.
+/// Memory for sorting, of one dab [bytes].
+pub(super) const ORDER_BYTES: usize = size_of::<(u64, u32, u32)>() + size_of::<u32>();
+
+/// Memory of one wave of patches, for kernels of the given half sizes [px], and of the threads that paint [bytes].
+pub(super) fn bytes(half: [usize; 2], rank: usize) -> u64 {
+    let [width, height] = half.map(|half| 2 * half + BIN + 20);
+    let lines = 4 * (GROUP * 2 * (width + 32) + 2 * (GROUP + 1) * (height + 32));
+    (WAVE * (width + 16) * height * 8 * rank + rayon::current_num_threads() * lines) as u64
+}
+
+/// Paints dabs, which must lie on the canvas with their whole kernels.
 pub(super) fn paint(
     canvas: &mut Canvas,
     brush: &Brush,
     dabs: &[Dab],
     set: InstructionSet,
     progress: &Progress,
-) -> bool {
+) -> Result<()> {
     let bins = bins(dabs, canvas.width);
     let mut patches: Vec<Patch> = Vec::new();
     patches.resize_with(WAVE.min(bins.len()), Patch::default);
     for wave in bins.chunks(WAVE) {
         patches.par_iter_mut().zip(wave).for_each(|(patch, bin)| {
             if !progress.stopped() {
-                paint_bin(patch, brush, dabs, bin, set);
+                paint_bin(patch, brush, dabs, bin, set, progress);
             }
         });
-        if progress.stopped() {
-            return false;
-        }
+        progress.check()?;
         let patches = &patches[..wave.len()];
         for (r, plane) in canvas.moments.iter_mut().enumerate() {
             let width = canvas.width;
@@ -95,35 +107,30 @@ pub(super) fn paint(
         }
         progress.advance(wave.iter().map(|bin| bin.len() as u64).sum());
     }
-    true
+    Ok(())
 }
 
-/// Indexes of the dabs of each bin that has any, bins in row-major order, within a bin near ones beside each other.
+/// Indexes of the dabs of each bin that has any, bins in row-major order, within a bin near ones beside each other; a
+/// crowded bin comes in several parts.
 fn bins(dabs: &[Dab], width: usize) -> Vec<Vec<u32>> {
     let across = width.div_ceil(BIN) as u64;
     let key = |dab: &Dab| {
         let [x, y] = dab.at.map(|p| p as u64);
         let bin = (y / BIN as u64) * across + x / BIN as u64;
-        // Quarters of depth first, then 16-pixel cells in boustrophedon order: a group's kernels are of similar size
-        // and place, so little of their union is wasted.
+        // 16-pixel cells in boustrophedon order: a group's kernels are of similar size and place, so little of their
+        // union is wasted.
         let (cx, cy) = (x % BIN as u64 / 16, y % BIN as u64 / 16);
-        (bin, cy * 4 + if cy % 2 == 0 { cx } else { 3 - cx })
+        bin * 16 + cy * 4 + if cy % 2 == 0 { cx } else { 3 - cx }
     };
-    let mut order: Vec<(u64, u64, u32)> = dabs
-        .iter()
-        .enumerate()
-        .map(|(i, dab)| {
-            let (bin, cell) = key(dab);
-            (bin, cell, i as u32)
-        })
-        .collect();
-    order.par_sort_unstable_by(|a, b| {
-        (a.0, a.1)
-            .cmp(&(b.0, b.1))
-            .then(dabs[a.2 as usize].d.abs().total_cmp(&dabs[b.2 as usize].d.abs()))
-            .then(a.2.cmp(&b.2))
-    });
-    order.chunk_by(|a, b| a.0 == b.0).map(|bin| bin.iter().map(|entry| entry.2).collect()).collect()
+    // Positive floats are in the order of their bits; equal ones keep their order by the index.
+    let entry = |(i, dab): (usize, &Dab)| (key(dab), (dab.d.abs() as f32).to_bits(), i as u32);
+    let mut order: Vec<(u64, u32, u32)> = dabs.par_iter().enumerate().map(entry).collect();
+    order.par_sort_unstable();
+    order
+        .chunk_by(|a, b| a.0 / 16 == b.0 / 16)
+        .flat_map(|bin| bin.chunks(LARGEST))
+        .map(|bin| bin.iter().map(|entry| entry.2).collect())
+        .collect()
 }
 
 /// Half size of a dab's kernel [px].
@@ -131,7 +138,7 @@ fn reach(brush: &Brush, axis: usize, d: f64) -> f64 {
     d.abs() * brush.slope[axis] + brush.tail
 }
 
-fn paint_bin(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32], set: InstructionSet) {
+fn paint_bin(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32], set: InstructionSet, progress: &Progress) {
     let mut span = [[usize::MAX, 0]; 2];
     for &i in bin {
         let dab = &dabs[i as usize];
@@ -152,14 +159,14 @@ fn paint_bin(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32], set: I
     }
     // SAFETY: the set was detected on this machine.
     unsafe {
-        dispatch!(set, paint_groups(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32]));
+        dispatch!(set, paint_groups(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32], progress: &Progress));
     }
 }
 
 /// # Safety
 /// The instruction set of `L` must be enabled.
 #[inline(always)]
-unsafe fn paint_groups<L: Lanes>(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32]) {
+unsafe fn paint_groups<L: Lanes>(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32], progress: &Progress) {
     let (width, height) = (patch.width, patch.height);
     // Kernels of a group: x as re and im of `width`, y as re and im of one dab, then (re, im) of all dabs by row.
     let tall = height.next_multiple_of(16) + 16;
@@ -168,6 +175,10 @@ unsafe fn paint_groups<L: Lanes>(patch: &mut Patch, brush: &Brush, dabs: &[Dab],
     let (xs, rest) = lines.values_mut().split_at_mut(GROUP * 2 * (width + 16));
     let (line, ys) = rest.split_at_mut(2 * tall);
     for group in bin.chunks(GROUP) {
+        // All points may lie in one bin.
+        if progress.stopped() {
+            return;
+        }
         let (mut span_x, mut span_y) = ([usize::MAX, 0], [usize::MAX, 0]);
         for &i in group {
             let dab = &dabs[i as usize];

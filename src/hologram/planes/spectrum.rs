@@ -38,121 +38,164 @@ pub(super) struct Layout {
     pub(super) origin: [i64; 2],
 }
 
-/// One plane: its moments and signed distance ζ before the panel [m].
-#[derive(Debug)]
-pub(super) struct Plane {
-    pub(super) distance: f64,
-    pub(super) moments: Vec<Vec<Complex32>>,
-}
-
 /// Phases of one plane, in turns.
 struct Carrier {
+    /// ζ/λ, ζ the plane's signed distance before the panel.
+    ratio: f64,
     /// ζ·(S(f_y) − 1/λ) modulo one, by row of the transform.
     rows: Aligned,
-    /// ζ/λ.
-    ratio: f32,
 }
 
 /// What the columns share.
-struct Shared<'a> {
-    optics: &'a Optics,
-    /// b = λ²f_y² and √(1 − b), by row of the transform.
+struct Shared {
+    /// Where the taper is dark: largest λ²f² along each axis.
+    limit: [f64; 2],
+    /// a = λ²f_x² by column of the transform.
+    columns: Vec<f64>,
+    /// b = λ²f_y² by row of the transform.
+    rows: Vec<f64>,
+    /// b and √(1 − b) for the inner loops.
     squares: Aligned,
     roots: Aligned,
-    carriers: Vec<Carrier>,
     /// λ²·mean f² of each axis and 2πh/λ.
     mean: [f64; 2],
     kappa: f64,
     set: InstructionSet,
 }
 
-/// Propagates the planes to the panel and adds them up. `depth` is h.
-pub(super) fn propagate(
-    field: &mut Field,
-    optics: &Optics,
-    layout: &Layout,
-    planes: &mut [Plane],
-    depth: f64,
-    set: InstructionSet,
-    progress: &Progress,
-) -> Result<()> {
-    let [width, height] = layout.size;
-    let mut planner = FftPlanner::<f32>::new();
-    let rows = [planner.plan_fft_forward(width), planner.plan_fft_inverse(width)];
-    let columns = [planner.plan_fft_forward(height), planner.plan_fft_inverse(height)];
-    for plane in planes.iter_mut() {
-        for moment in &mut plane.moments {
+/// The spectrum on the panel: planes are added one after another, then it is transformed back.
+///
+/// Columns stand one after another, `height` + [`GAP`] samples each.
+pub(super) struct Spectrum {
+    layout: Layout,
+    shared: Shared,
+    wavelength: f64,
+    rows: [Arc<dyn Fft<f32>>; 2],
+    columns: [Arc<dyn Fft<f32>>; 2],
+    sum: Vec<Complex32>,
+}
+
+impl Spectrum {
+    /// A dark one; `depth` is h [m].
+    pub(super) fn new(optics: &Optics, layout: &Layout, depth: f64, set: InstructionSet) -> Self {
+        let [width, height] = layout.size;
+        let mut planner = FftPlanner::<f32>::new();
+        let rows = [planner.plan_fft_forward(width), planner.plan_fft_inverse(width)];
+        let columns = [planner.plan_fft_forward(height), planner.plan_fft_inverse(height)];
+        let lambda = optics.wavelength;
+        let square = |axis: usize, k: usize| {
+            let n = layout.size[axis];
+            let signed = if k < n.div_ceil(2) { k as f64 } else { k as f64 - n as f64 };
+            (lambda * signed / (n as f64 * optics.pitch[axis])).powi(2)
+        };
+        let (mut squares, mut roots) = (aligned(height), aligned(height));
+        let by_row: Vec<f64> = (0..height).map(|k| square(1, k)).collect();
+        for (k, &b) in by_row.iter().enumerate() {
+            squares.values_mut()[k] = b as f32;
+            roots.values_mut()[k] = (1.0 - b).max(0.0).sqrt() as f32;
+        }
+        let shared = Shared {
+            limit: optics.taper.map(|taper| (lambda * taper.reach(5.0)).powi(2)),
+            columns: (0..width).map(|k| square(0, k)).collect(),
+            rows: by_row,
+            squares,
+            roots,
+            mean: [0, 1].map(|axis| lambda * lambda * mean_square(optics, axis)),
+            kappa: TAU * depth / lambda,
+            set,
+        };
+        let sum = bytemuck::zeroed_vec(width * (height + GAP));
+        Self { layout: *layout, shared, wavelength: lambda, rows, columns, sum }
+    }
+
+    /// Memory of the spectrum and of the threads that work on it [bytes].
+    pub(super) fn bytes(layout: &Layout, rank: usize) -> u64 {
+        let [width, height] = layout.size;
+        let column = height + GAP;
+        // Of each thread: columns of each moment with the transform's scratch, C and amplitude, or rows on the way back.
+        let strip = (STRIP * (rank + 1) * column * 8 + STRIP * height * 8).max((STRIP + 1) * width * 8);
+        (width * column * 8 + rayon::current_num_threads() * strip) as u64
+    }
+
+    /// Adds a plane at the signed distance ζ before the panel [m]; its moments are transformed in place.
+    pub(super) fn add(&mut self, distance: f64, moments: &mut [Vec<Complex32>], progress: &Progress) -> Result<()> {
+        let [width, height] = self.layout.size;
+        let plan = &self.rows[0];
+        for moment in moments.iter_mut() {
             moment.par_chunks_mut(width * STRIP).for_each_init(
-                || vec![Complex32::default(); rows[0].get_inplace_scratch_len()],
-                |scratch, rows_of| {
+                || vec![Complex32::default(); plan.get_inplace_scratch_len()],
+                |scratch, rows| {
                     if !progress.stopped() {
-                        rows[0].process_with_scratch(rows_of, scratch);
+                        plan.process_with_scratch(rows, scratch);
                     }
                 },
             );
         }
-    }
-    progress.check()?;
-    let lambda = optics.wavelength;
-    let frequency = |k: usize, n: usize, pitch: f64| {
-        let signed = if k < n.div_ceil(2) { k as f64 } else { k as f64 - n as f64 };
-        signed / (n as f64 * pitch)
-    };
-    let (mut squares, mut roots) = (aligned(height), aligned(height));
-    let fy: Vec<f64> = (0..height).map(|k| frequency(k, height, optics.pitch[1])).collect();
-    for (k, f) in fy.iter().enumerate() {
-        let b = (lambda * f).powi(2);
-        squares.values_mut()[k] = b as f32;
-        roots.values_mut()[k] = (1.0 - b).max(0.0).sqrt() as f32;
-    }
-    let carriers = planes
-        .iter()
-        .map(|plane| {
-            let mut rows = aligned(height);
-            for (row, f) in rows.values_mut().iter_mut().zip(&fy) {
-                let b = (lambda * f).powi(2).min(1.0);
-                let turns = -plane.distance / lambda * b / (1.0 + (1.0 - b).sqrt());
-                *row = (turns - turns.round()) as f32;
-            }
-            Carrier { rows, ratio: (plane.distance / lambda) as f32 }
-        })
-        .collect();
-    let mean = [0, 1].map(|axis| lambda * lambda * mean_square(optics, axis));
-    let shared = Shared { optics, squares, roots, carriers, mean, kappa: TAU * depth / lambda, set };
-    let grid = field.grid;
-    let mut turned = vec![Complex32::default(); width * grid.height];
-    let planes = &*planes;
-    turned.par_chunks_mut(grid.height * STRIP).enumerate().for_each_init(
-        || Strip::new(layout, planes[0].moments.len(), &columns),
-        |strip, (index, out)| {
-            if !progress.stopped() {
-                strip.run(index * STRIP, layout, planes, &shared, &columns, out);
-                progress.advance(STRIP as u64);
-            }
-        },
-    );
-    progress.check()?;
-    let turned = &turned;
-    let inverse = &rows[1];
-    field.samples.par_chunks_mut(grid.width * STRIP).enumerate().for_each_init(
-        || (vec![Complex32::default(); STRIP * width], vec![Complex32::default(); inverse.get_inplace_scratch_len()]),
-        |(lines, scratch), (block, samples)| {
-            let count = samples.len() / grid.width;
-            for column in 0..width {
-                let from = column * grid.height + block * STRIP;
-                for (i, &u) in turned[from..from + count].iter().enumerate() {
-                    lines[i * width + column] = u;
+        progress.check()?;
+        let ratio = distance / self.wavelength;
+        let mut rows = aligned(height);
+        for (row, &b) in rows.values_mut().iter_mut().zip(&self.shared.rows) {
+            let b = b.min(1.0);
+            let turns = -ratio * b / (1.0 + (1.0 - b).sqrt());
+            *row = (turns - turns.round()) as f32;
+        }
+        let carrier = Carrier { ratio, rows };
+        let (layout, shared, plan, moments) = (&self.layout, &self.shared, &self.columns[0], &*moments);
+        self.sum.par_chunks_mut((height + GAP) * STRIP).enumerate().for_each_init(
+            || Strip::new(layout, moments.len(), plan),
+            |strip, (index, sum)| {
+                if !progress.stopped() {
+                    strip.add(index * STRIP, layout, moments, &carrier, shared, plan, sum);
+                    progress.advance(STRIP as u64);
                 }
-            }
-            for (line, row) in lines.chunks_exact_mut(width).zip(samples.chunks_exact_mut(grid.width)) {
-                inverse.process_with_scratch(line, scratch);
-                for (column, u) in row.iter_mut().enumerate() {
-                    *u += line[wrap(column, layout.origin[0], width)];
+            },
+        );
+        progress.check()
+    }
+
+    /// Transforms back and adds the panel's window to the field.
+    pub(super) fn finish(mut self, field: &mut Field, progress: &Progress) -> Result<()> {
+        let [width, height] = self.layout.size;
+        let stride = height + GAP;
+        let plan = &self.columns[1];
+        let scale = 1.0 / (width as f32 * height as f32);
+        let shared = &self.shared;
+        self.sum.par_chunks_mut(stride * STRIP).enumerate().for_each_init(
+            || vec![Complex32::default(); plan.get_inplace_scratch_len()],
+            |scratch, (index, columns)| {
+                for (column, a) in columns.chunks_exact_mut(stride).zip(&shared.columns[index * STRIP..]) {
+                    if *a <= shared.limit[0] && !progress.stopped() {
+                        plan.process_with_scratch(&mut column[..height], scratch);
+                    }
                 }
-            }
-        },
-    );
-    Ok(())
+            },
+        );
+        progress.check()?;
+        let (layout, sum, plan) = (&self.layout, &self.sum, &self.rows[1]);
+        let grid = field.grid;
+        field.samples.par_chunks_mut(grid.width * STRIP).enumerate().for_each_init(
+            || (vec![Complex32::default(); STRIP * width], vec![Complex32::default(); plan.get_inplace_scratch_len()]),
+            |(lines, scratch), (block, samples)| {
+                if progress.stopped() {
+                    return;
+                }
+                let count = samples.len() / grid.width;
+                let places: [usize; STRIP] = std::array::from_fn(|i| wrap(block * STRIP + i, layout.origin[1], height));
+                for (column, from) in sum.chunks_exact(stride).enumerate() {
+                    for (i, &row) in places[..count].iter().enumerate() {
+                        lines[i * width + column] = from[row] * scale;
+                    }
+                }
+                for (line, row) in lines.chunks_exact_mut(width).zip(samples.chunks_exact_mut(grid.width)) {
+                    plan.process_with_scratch(line, scratch);
+                    for (column, u) in row.iter_mut().enumerate() {
+                        *u += line[wrap(column, layout.origin[0], width)];
+                    }
+                }
+            },
+        );
+        progress.check()
+    }
 }
 
 /// Index on the periodic grid of a panel's column or row.
@@ -168,95 +211,72 @@ fn aligned(count: usize) -> Aligned {
 
 /// Buffers of one thread for a strip of columns.
 struct Strip {
-    /// Columns of each moment, then their sum; [`STRIP`] of `height` + [`GAP`] each.
+    /// Columns of each moment, [`STRIP`] of `height` + [`GAP`] each.
     columns: Vec<Vec<Complex32>>,
-    sum: Vec<Complex32>,
     /// C and the amplitude of one column of the spectrum.
-    residual: Vec<Aligned>,
-    amplitude: Vec<Aligned>,
+    residual: Aligned,
+    amplitude: Aligned,
     scratch: Vec<Complex32>,
 }
 
 impl Strip {
-    fn new(layout: &Layout, rank: usize, plans: &[Arc<dyn Fft<f32>>; 2]) -> Self {
+    fn new(layout: &Layout, rank: usize, plan: &Arc<dyn Fft<f32>>) -> Self {
         let height = layout.size[1];
         let zero = Complex32::default();
-        let scratch = plans.iter().map(|plan| plan.get_inplace_scratch_len()).max().unwrap_or(0);
         Self {
             columns: vec![vec![zero; STRIP * (height + GAP)]; rank],
-            sum: vec![zero; STRIP * (height + GAP)],
-            residual: vec![aligned(height); STRIP],
-            amplitude: vec![aligned(height); STRIP],
-            scratch: vec![zero; scratch],
+            residual: aligned(height),
+            amplitude: aligned(height),
+            scratch: vec![zero; plan.get_inplace_scratch_len()],
         }
     }
 
-    /// Columns `first`… of the spectrum: transforms, multiplies, adds up, transforms back, and writes the panel's rows.
-    fn run(
+    /// Transforms columns `first`… of a plane's moments and adds them to those of the spectrum.
+    #[allow(clippy::too_many_arguments)] // one strip's place in what all strips share
+    fn add(
         &mut self,
         first: usize,
         layout: &Layout,
-        planes: &[Plane],
+        moments: &[Vec<Complex32>],
+        carrier: &Carrier,
         shared: &Shared,
-        plans: &[Arc<dyn Fft<f32>>; 2],
-        out: &mut [Complex32],
+        plan: &Arc<dyn Fft<f32>>,
+        sum: &mut [Complex32],
     ) {
         let [width, height] = layout.size;
         let stride = height + GAP;
-        let rows = out.len() / STRIP;
-        let lambda = shared.optics.wavelength;
         // Beyond its taper a column is dark, and its residual phase without bound.
-        let limit = shared.optics.taper.map(|taper| (lambda * taper.reach(5.0)).powi(2));
-        let a: [f64; STRIP] = std::array::from_fn(|i| {
-            let k = (first + i) as f64;
-            let signed = if first + i < width.div_ceil(2) { k } else { k - width as f64 };
-            (lambda * signed / (width as f64 * shared.optics.pitch[0])).powi(2)
-        });
-        self.sum.fill(Complex32::default());
-        for i in (0..STRIP).filter(|&i| a[i] <= limit[0]) {
-            let (residual, amplitude) = (&mut self.residual[i], &mut self.amplitude[i]);
-            let (a, limit) = (a[i], limit[1] as f32);
+        let lit: [bool; STRIP] = std::array::from_fn(|i| shared.columns[first + i] <= shared.limit[0]);
+        for (moment, columns) in moments.iter().zip(&mut self.columns) {
+            for row in 0..layout.painted {
+                let from = &moment[row * width + first..row * width + first + STRIP];
+                for (i, &u) in from.iter().enumerate() {
+                    columns[i * stride + row] = u;
+                }
+            }
+            for (column, _) in columns.chunks_exact_mut(stride).zip(lit).filter(|&(_, lit)| lit) {
+                column[layout.painted..].fill(Complex32::default());
+                plan.process_with_scratch(&mut column[..height], &mut self.scratch);
+            }
+        }
+        for i in (0..STRIP).filter(|&i| lit[i]) {
+            let a = shared.columns[first + i];
+            // ζ·S(f_x) in f64, reduced.
+            let turns = carrier.ratio * (1.0 - a).sqrt();
+            let base = (turns - turns.round()) as f32;
+            let range = i * stride..i * stride + height;
+            let moments: Vec<&[Complex32]> = self.columns.iter().map(|columns| &columns[range.clone()]).collect();
+            let (moments, sum) = (&moments[..], &mut sum[range]);
+            let (residual, amplitude) = (&mut self.residual, &mut self.amplitude);
+            let limit = shared.limit[1] as f32;
             // SAFETY: the set was detected; all columns have `height` values, a multiple of every lane count.
             unsafe {
                 dispatch!(shared.set, prepare(shared: &Shared, a: f64, limit: f32, residual: &mut Aligned, amplitude: &mut Aligned));
             }
-        }
-        for (plane, carrier) in planes.iter().zip(&shared.carriers) {
-            for (moment, columns) in plane.moments.iter().zip(&mut self.columns) {
-                for row in 0..layout.painted {
-                    let from = &moment[row * width + first..row * width + first + STRIP];
-                    for (i, &u) in from.iter().enumerate() {
-                        columns[i * stride + row] = u;
-                    }
-                }
-                for (i, column) in columns.chunks_exact_mut(stride).enumerate() {
-                    if a[i] <= limit[0] {
-                        column[layout.painted..].fill(Complex32::default());
-                        plans[0].process_with_scratch(&mut column[..height], &mut self.scratch);
-                    }
-                }
-            }
-            for i in (0..STRIP).filter(|&i| a[i] <= limit[0]) {
-                // ζ·S(f_x) in f64, reduced.
-                let turns = plane.distance / lambda * (1.0 - a[i]).sqrt();
-                let base = (turns - turns.round()) as f32;
-                let a = a[i];
-                let range = i * stride..i * stride + height;
-                let moments: Vec<&[Complex32]> = self.columns.iter().map(|columns| &columns[range.clone()]).collect();
-                let moments = &moments[..];
-                let sum = &mut self.sum[range.clone()];
-                let (residual, amplitude) = (self.residual[i].values(), self.amplitude[i].values());
-                // SAFETY: as above.
-                unsafe {
-                    dispatch!(shared.set, accumulate(shared: &Shared, carrier: &Carrier, base: f32, a: f64, residual: &[f32], amplitude: &[f32], moments: &[&[Complex32]], sum: &mut [Complex32]));
-                }
-            }
-        }
-        let scale = 1.0 / (width as f32 * height as f32);
-        for (column, out) in self.sum.chunks_exact_mut(stride).zip(out.chunks_exact_mut(rows)) {
-            plans[1].process_with_scratch(&mut column[..height], &mut self.scratch);
-            for (row, u) in out.iter_mut().enumerate() {
-                *u = column[wrap(row, layout.origin[1], height)] * scale;
+            let (residual, amplitude) = (self.residual.values(), self.amplitude.values());
+            // SAFETY: as above.
+            unsafe {
+                dispatch!(shared.set, accumulate(shared: &Shared, carrier: &Carrier, base: f32, a: f64, residual: &[f32], amplitude: &[f32], moments: &[&[Complex32]], sum: &mut [Complex32]));
             }
         }
     }
@@ -321,7 +341,7 @@ unsafe fn accumulate<L: Lanes>(
         let constant = L::splat((0.25 * (my * a - mx * my)) as f32);
         let slope = L::splat((0.25 * mx) as f32);
         let scale = L::splat(shared.kappa as f32);
-        let (base, ratio) = (L::splat(base), L::splat(carrier.ratio));
+        let (base, ratio) = (L::splat(base), L::splat(carrier.ratio as f32));
         while k < count {
             let c = L::load(residual.as_ptr().add(k));
             let phase = c.fma(ratio, L::load(rows.as_ptr().add(k)).add(base));

@@ -12,6 +12,7 @@
 use crate::field::Complex64;
 use crate::hologram::definition::Optics;
 use crate::hologram::lanes::{Aligned, Lanes};
+use crate::progress::Progress;
 use rayon::prelude::*;
 use rustfft::FftPlanner;
 use std::f64::consts::TAU;
@@ -88,8 +89,15 @@ impl Table {
         (Self::levels(optics, axis, depth, fineness).1 * (fineness.phases() + 1) * 2 * row * 4) as u64
     }
 
-    /// Kernels for |d| ≤ `depth`, `tail` pixels beyond the cone.
-    pub(super) fn new(optics: &Optics, axis: usize, depth: f64, tail: f64, fineness: Fineness) -> Self {
+    /// Kernels for |d| ≤ `depth`, `tail` pixels beyond the cone; unspecified when asked to stop.
+    pub(super) fn new(
+        optics: &Optics,
+        axis: usize,
+        depth: f64,
+        tail: f64,
+        fineness: Fineness,
+        progress: &Progress,
+    ) -> Self {
         let (step, levels) = Self::levels(optics, axis, depth, fineness);
         let phases = fineness.phases();
         let half = Self::half_width(optics, axis, depth, tail);
@@ -122,6 +130,9 @@ impl Table {
         values.values_mut()[..levels * level_values].par_chunks_mut(level_values).enumerate().for_each_init(
             || (vec![Complex64::default(); count], vec![Complex64::default(); plan.get_inplace_scratch_len()]),
             |(line, scratch), (level, out)| {
+                if progress.stopped() {
+                    return;
+                }
                 // One level before zero and two behind the last serve the four-point interpolation.
                 let d = (level as f64 - 1.0) * step;
                 line.fill(Complex64::default());

@@ -6,6 +6,7 @@
 
 use crate::field::Complex64;
 use crate::hologram::definition::erfc;
+use crate::progress::Progress;
 use rayon::prelude::*;
 
 /// Segments of a level; what [`Lanes::lookup`](crate::hologram::lanes::Lanes::lookup) indexes.
@@ -14,32 +15,40 @@ pub(super) const SEGMENTS: usize = 16;
 /// f32 values of a level: (re, im) × four coefficients × sixteen segments.
 pub(super) const LEVEL: usize = 2 * 4 * SEGMENTS;
 
-/// Distance of neighbouring levels in q: |∂T/∂q| ≤ 0.2, and at most half a step is rounded off: 5e-5 at the edge alone.
-const STEP: f64 = 5e-4;
-
 /// Levels for a range of q.
 #[derive(Debug, Default)]
-pub(super) struct EdgeTable {
+pub(crate) struct EdgeTable {
     /// Half the range of v, V: beyond it T is 0 or 1 to 1e-5.
-    pub(super) half: f64,
-    lowest: f64,
-    count: usize,
-    values: Vec<f32>,
+    pub(crate) half: f64,
+    /// q of the first level.
+    pub(crate) lowest: f64,
+    /// Number of levels.
+    pub(crate) count: usize,
+    /// Levels of 128 values: real and imaginary part, four powers each, sixteen segments each.
+    pub(crate) values: Vec<f32>,
 }
 
 impl EdgeTable {
-    /// Levels that cover `lowest..=highest`.
-    pub(super) fn new(lowest: f64, highest: f64) -> Self {
+    /// Distance of neighbouring levels in q: |∂T/∂q| ≤ 0.2, and at most half a step is rounded off: 5e-5 at the edge
+    /// alone.
+    pub(crate) const STEP: f64 = 5e-4;
+
+    /// Levels that cover `lowest..=highest`; dark ones when asked to stop.
+    pub(super) fn new(lowest: f64, highest: f64, progress: &Progress) -> Self {
         // |exp(−v²/(1 − iq))| = exp(−v²/(1 + q²)); erfc(3.02)/2 = 1e-5.
         let half = 3.02 * (1.0 + highest * highest).sqrt();
-        let count = ((highest - lowest) / STEP).ceil() as usize + 1;
+        let count = ((highest - lowest) / Self::STEP).ceil() as usize + 1;
         let mut values = vec![0.0; count * LEVEL];
-        values.par_chunks_mut(LEVEL).enumerate().for_each(|(i, level)| fill(level, lowest + i as f64 * STEP, half));
+        values.par_chunks_mut(LEVEL).enumerate().for_each(|(i, level)| {
+            if !progress.stopped() {
+                fill(level, lowest + i as f64 * Self::STEP, half);
+            }
+        });
         Self { half, lowest, count, values }
     }
     /// The level nearest to q.
-    pub(super) fn level(&self, q: f64) -> &[f32] {
-        let index = ((q - self.lowest) / STEP + 0.5).max(0.0) as usize;
+    pub(crate) fn level(&self, q: f64) -> &[f32] {
+        let index = ((q - self.lowest) / Self::STEP + 0.5).max(0.0) as usize;
         let index = index.min(self.count - 1);
         &self.values[index * LEVEL..(index + 1) * LEVEL]
     }
@@ -49,7 +58,7 @@ impl EdgeTable {
     }
     /// Memory [bytes].
     pub(super) fn bytes(lowest: f64, highest: f64) -> u64 {
-        (((highest - lowest) / STEP).ceil() as u64 + 1) * LEVEL as u64 * 4
+        (((highest - lowest) / Self::STEP).ceil() as u64 + 1) * LEVEL as u64 * 4
     }
 }
 
@@ -90,7 +99,7 @@ mod tests {
     #[test]
     fn levels_equal_the_function() {
         for (lowest, highest) in [(0.0, 0.01), (0.3, 0.31), (1.0, 1.06), (1.6, 1.7)] {
-            let table = EdgeTable::new(lowest, highest);
+            let table = EdgeTable::new(lowest, highest, &Progress::new());
             for q in [lowest, 0.5 * (lowest + highest), highest] {
                 let level = table.level(q);
                 let root = Complex64::new(1.0, -q).sqrt();

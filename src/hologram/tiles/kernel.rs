@@ -5,6 +5,7 @@
 //! [`super::shape`].
 
 use super::edge::{EdgeTable, SEGMENTS};
+use crate::hologram::Cull;
 use crate::hologram::definition::Optics;
 use crate::hologram::lanes::{Aligned, Lanes, cos_sin};
 use std::f64::consts::PI;
@@ -37,21 +38,22 @@ pub(super) struct Relative {
 
 /// What the kernels need to know about one axis of the panel and of the class's edge table.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Axis {
+pub(crate) struct Axis {
     /// Step of the coordinate per index; negative for rows, which run against y [m].
-    pitch: f64,
+    pub(crate) pitch: f64,
     /// Tangent of the cone's half angle.
-    tangent: f64,
+    pub(crate) tangent: f64,
     /// Segment coordinate of a direction's sine: scale·sine + offset.
-    scale: f64,
-    offset: f64,
+    pub(crate) scale: f64,
+    /// As `scale`.
+    pub(crate) offset: f64,
     /// q = edge·(1 − sine²)/r [m].
-    edge: f64,
+    pub(crate) edge: f64,
 }
 
 impl Axis {
     /// Constants of axis 0 (columns) or 1 (rows).
-    pub(super) fn new(optics: &Optics, axis: usize, limit: Limit) -> Self {
+    pub(crate) fn new(optics: &Optics, axis: usize, limit: Limit) -> Self {
         let (taper, wavelength) = (optics.taper[axis], optics.wavelength);
         let density = match limit {
             Limit::Soft(table) => table.density(),
@@ -69,13 +71,24 @@ impl Axis {
 
 /// How a factor is limited at the cone's edge.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Limit<'a> {
+pub(crate) enum Limit<'a> {
     /// Not at all.
     None,
     /// Cut at |Δ| = |z|·tangent.
     Hard,
     /// Tapered.
     Soft(&'a EdgeTable),
+}
+
+impl<'a> Limit<'a> {
+    /// The limit with its table.
+    pub(crate) fn new(cull: Cull, table: &'a EdgeTable) -> Self {
+        match cull {
+            Cull::Soft => Self::Soft(table),
+            Cull::Hard => Self::Hard,
+            Cull::None => Self::None,
+        }
+    }
 }
 
 /// A phase and an amplitude along one axis of the tile, as polynomials of the index from its centre.
@@ -172,8 +185,11 @@ unsafe fn evaluate<L: Lanes>(factor: &Factor, u: L) -> (L, L) {
 }
 
 /// T at segment coordinates `t`: (re, im) for a diverging wave.
+///
+/// # Safety
+/// As [`Lanes`]; `level` is one of an [`EdgeTable`].
 #[inline(always)]
-unsafe fn taper<L: Lanes>(t: L, level: &[f32]) -> (L, L) {
+pub(crate) unsafe fn taper<L: Lanes>(t: L, level: &[f32]) -> (L, L) {
     // SAFETY: the caller's promise; a level has its eight runs of sixteen.
     unsafe {
         let t = t.max(L::splat(0.0)).min(L::splat(15.999_99));
@@ -196,6 +212,12 @@ pub(super) struct Panels {
     pub(super) re: Aligned,
     /// As `re`.
     pub(super) im: Aligned,
+}
+
+/// Memory of [`Panels`] for a tile [bytes].
+pub(super) fn bytes(width: usize, height: usize) -> u64 {
+    let factors = BATCH * 2 * (width + height.next_multiple_of(ROWS)) + 2 * (height.max(width) + 32);
+    4 * (factors + 2 * width * height + 5 * 16) as u64
 }
 
 impl Panels {

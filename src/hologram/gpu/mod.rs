@@ -1,0 +1,459 @@
+//! The sum over points on a graphics processor, through wgpu's compute shaders; any adapter, a software one too.
+//!
+//! f32 cannot hold a path of a million wavelengths, and a shading language promises no f64. So the field is cut into
+//! cells of 256×256 pixels; for each cell and point the CPU computes distance and phase at the cell's centre in f64
+//! ([`Point`]), and the shader only what differs from there: below 91 turns within the band, 2e-5 turns in f32. A
+//! workgroup takes a tile of 32×32 pixels, where the sphere is the product of a column's and a row's factor
+//! ([`super::tiles`] has the error bound); where that is not enough each pixel takes its own path from the cell's
+//! centre. Phases are reduced to turns before every sine, the sine is a polynomial, the soft taper the same table as on
+//! the CPU. Points near the panel stay on the CPU ([`super::near`]).
+//!
+//! Fields larger than a binding are computed in bands of rows; a dispatch is kept to some 20 ms, so that a stop is
+//! noticed and no driver's watchdog bites; bands are read back while the next one is computed. The order of the sums
+//! is fixed: the same bits on one adapter and driver.
+
+mod device;
+
+use super::Cull;
+use super::definition::Optics;
+use super::sources::Source;
+use super::tiles::{Axis, Class, EdgeTable, Limit};
+use crate::error::Result;
+use crate::field::{Complex32, Field, Grid};
+use crate::progress::Progress;
+use device::Device;
+use pixels::wgpu;
+use rayon::prelude::*;
+use std::sync::OnceLock;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+/// Side of a cell [px]; as in the shader.
+pub(crate) const CELL: usize = 256;
+
+/// Tiles of a cell; as in the shader.
+const TILES: u32 = 64;
+
+/// Rows of the shader's tile; classes that need smaller ones take the exact path.
+const TILE_ROWS: usize = 32;
+
+/// Memory for the points of the cells that are prepared together [bytes].
+const WAVE: u64 = 32 << 20;
+
+/// Points of one dispatch.
+const CHUNK: usize = 1 << 19;
+
+/// Largest band [bytes].
+const BAND: u64 = 64 << 20;
+
+/// Wanted time of a dispatch.
+const DISPATCH: Duration = Duration::from_millis(20);
+
+/// A point seen from a cell's centre, as the shader takes it.
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Point {
+    sine: [f32; 2],
+    inverse: f32,
+    base: f32,
+    turns: f32,
+    amplitude: f32,
+    sign: f32,
+    distance: f32,
+}
+
+/// Constants of a dispatch, as the shader takes them.
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Job {
+    pitch: [f32; 2],
+    scale: [f32; 2],
+    offset: [f32; 2],
+    edge: [f32; 2],
+    tangent: [f32; 2],
+    wavenumber: f32,
+    lowest: f32,
+    density: f32,
+    levels: u32,
+    limit: u32,
+    width: u32,
+    height: u32,
+    unused: u32,
+}
+
+/// Name of the adapter, or why there is none.
+pub(crate) fn adapter() -> Result<&'static str> {
+    device::device().map(|device| device.name.as_str())
+}
+
+/// Memory beside points and field [bytes], on the host: two waves of prepared points, a dispatch, two bands.
+pub(crate) fn bytes(grid: &Grid, points: usize) -> u64 {
+    let wave = WAVE.max((size_of::<Point>() * points) as u64);
+    let band = BAND.min(8 * grid.len() as u64).max(8 * grid.width as u64);
+    2 * wave + 2 * (CHUNK.min(points) * size_of::<Point>()) as u64 + 2 * band + (size_of::<Source>() * points) as u64
+}
+
+/// Predicted wall time of point–pixel pairs [s]; `None` without an adapter, or with one that is the CPU itself.
+///
+/// The adapter is measured once, with a sum of 4e9 pairs.
+pub(crate) fn seconds(pairs: f64) -> Option<f64> {
+    static RATE: OnceLock<Option<f64>> = OnceLock::new();
+    let device = device::device().ok().filter(|device| !device.software)?;
+    let rate = *RATE.get_or_init(|| measured_rate(device).ok());
+    Some(0.02 + pairs / rate?)
+}
+
+/// Pairs a second of the product kernel, readback included.
+fn measured_rate(device: &Device) -> Result<f64> {
+    let grid = Grid::new(2048, 2048, 8e-6, 8e-6)?;
+    let optics = Optics::new(&grid, 633e-9)?;
+    let source = Source { x: 0.0, y: 0.0, distance: 0.3, sign: 1.0, amplitude: 1.0, turns: 0.0 };
+    let sources = vec![source; 1024];
+    let indexes: Vec<usize> = (0..sources.len()).collect();
+    let classes = super::tiles::classify(&optics, &grid, &sources, &indexes, Cull::None, 1e-2, &Progress::new());
+    let mut field = Field::zeros(grid, optics.wavelength);
+    let mut seconds = f64::INFINITY;
+    // The first run compiles and raises clocks.
+    for _ in 0..2 {
+        let start = Instant::now();
+        add_with(device, &mut field, &optics, &sources, &classes, Cull::None, &Progress::new())?;
+        seconds = seconds.min(start.elapsed().as_secs_f64());
+    }
+    Ok(grid.len() as f64 * sources.len() as f64 / seconds)
+}
+
+/// Adds classes of far sources to the field.
+///
+/// # Errors
+/// [`Error::Unsupported`](crate::Error::Unsupported) without an adapter, or with the driver's words when it fails.
+pub(crate) fn add(
+    field: &mut Field,
+    optics: &Optics,
+    sources: &[Source],
+    classes: &[Class],
+    cull: Cull,
+    progress: &Progress,
+) -> Result<()> {
+    add_with(device::device()?, field, optics, sources, classes, cull, progress)
+}
+
+fn add_with(
+    device: &Device,
+    field: &mut Field,
+    optics: &Optics,
+    sources: &[Source],
+    classes: &[Class],
+    cull: Cull,
+    progress: &Progress,
+) -> Result<()> {
+    let grid = field.grid;
+    let limits = device.device.limits();
+    let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(BAND);
+    let rows = ((binding / (8 * grid.width as u64)) as usize).clamp(1, grid.height);
+    let sets: Vec<Set> = classes.iter().map(|class| Set::new(device, optics, sources, class, cull, progress)).collect();
+    progress.check()?;
+    let mut engine = Engine::new(device, grid.width * rows);
+    let mut behind: Option<Readback> = None;
+    for first in (0..grid.height).step_by(rows) {
+        let band =
+            Band { grid: &grid, first, rows: rows.min(grid.height - first), wavenumber: 1.0 / optics.wavelength };
+        for set in &sets {
+            engine.sum(&band, set, progress)?;
+        }
+        let now = engine.read_back(&band);
+        if let Some(previous) = behind.replace(now) {
+            previous.add_to(device, field)?;
+        }
+    }
+    behind.map_or(Ok(()), |last| last.add_to(device, field))
+}
+
+/// Rows of the field that are computed together.
+struct Band<'a> {
+    grid: &'a Grid,
+    first: usize,
+    rows: usize,
+    wavenumber: f64,
+}
+
+impl Band<'_> {
+    /// Column and row, from the band's first, of the cells.
+    fn cells(&self) -> Vec<[usize; 2]> {
+        let columns = (0..self.grid.width).step_by(CELL);
+        (0..self.rows).step_by(CELL).flat_map(|row| columns.clone().map(move |column| [column, row])).collect()
+    }
+
+    /// The members that light a cell.
+    fn points(&self, set: &Set, [column, row]: [usize; 2]) -> Vec<Point> {
+        let middle = 0.5 * (CELL as f64 - 1.0);
+        let x = self.grid.x(column) + middle * self.grid.pitch_x;
+        let y = self.grid.y(self.first + row) - middle * self.grid.pitch_y;
+        let half = [self.grid.pitch_x, self.grid.pitch_y].map(|pitch| 0.5 * CELL as f64 * pitch);
+        let mut points = Vec::new();
+        for s in &set.members {
+            let (dx, dy) = (x - s.x, y - s.y);
+            let lit = |d: f64, axis: usize| d.abs() - half[axis] <= set.tangent[axis] * s.distance;
+            if !(lit(dx, 0) && lit(dy, 1)) {
+                continue;
+            }
+            // A tenth of a wavelength keeps directions finite at a cell's centre that the point sits on.
+            let r = (dx * dx + dy * dy + s.distance * s.distance).sqrt().max(0.1 / self.wavenumber);
+            let turns = s.sign * r * self.wavenumber;
+            let phase = turns + s.turns;
+            points.push(Point {
+                sine: [(dx / r) as f32, (dy / r) as f32],
+                inverse: (1.0 / r) as f32,
+                base: (phase - phase.round()) as f32,
+                turns: turns as f32,
+                amplitude: (s.amplitude / r) as f32,
+                sign: s.sign as f32,
+                distance: s.distance as f32,
+            });
+        }
+        points
+    }
+}
+
+/// A class of points with what the shader needs for it.
+struct Set {
+    members: Vec<Source>,
+    /// Half width of the cone per metre of distance.
+    tangent: [f64; 2],
+    /// Index of the pipeline.
+    pipeline: usize,
+    edges: wgpu::Buffer,
+    /// Constants, but for the band's size.
+    job: Job,
+}
+
+impl Set {
+    fn new(
+        device: &Device,
+        optics: &Optics,
+        sources: &[Source],
+        class: &Class,
+        cull: Cull,
+        progress: &Progress,
+    ) -> Self {
+        let table = class.edges(optics, cull, progress);
+        let limit = Limit::new(cull, &table);
+        let axes = [0, 1].map(|axis| Axis::new(optics, axis, limit));
+        let job = Job {
+            pitch: axes.map(|axis| axis.pitch as f32),
+            scale: axes.map(|axis| axis.scale as f32),
+            offset: axes.map(|axis| axis.offset as f32),
+            edge: axes.map(|axis| axis.edge as f32),
+            tangent: axes.map(|axis| axis.tangent as f32),
+            wavenumber: (1.0 / optics.wavelength) as f32,
+            lowest: table.lowest as f32,
+            density: (1.0 / EdgeTable::STEP) as f32,
+            levels: table.count.max(1) as u32,
+            limit: match cull {
+                Cull::None => 0,
+                Cull::Hard => 1,
+                Cull::Soft => 2,
+            },
+            width: 0,
+            height: 0,
+            unused: 0,
+        };
+        // A binding must not be empty.
+        let values: &[f32] = if table.values.is_empty() { &[0.0; 4] } else { &table.values };
+        let edges = device.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("edges"),
+            size: size_of_val(values) as u64,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        device.queue.write_buffer(&edges, 0, bytemuck::cast_slice(values));
+        let shape = class.shape;
+        Self {
+            members: class.members(sources),
+            tangent: class.tangent(optics, limit),
+            pipeline: usize::from(shape.exact || shape.height < TILE_ROWS),
+            edges,
+            job,
+        }
+    }
+}
+
+/// Buffers of one computation, and how much a dispatch may take.
+struct Engine<'a> {
+    device: &'a Device,
+    job: wgpu::Buffer,
+    points: wgpu::Buffer,
+    cells: wgpu::Buffer,
+    band: wgpu::Buffer,
+    /// Pairs of a dispatch.
+    pairs: f64,
+}
+
+impl<'a> Engine<'a> {
+    fn new(device: &'a Device, pixels: usize) -> Self {
+        let buffer = |label: &str, size: usize, usage: wgpu::BufferUsages| {
+            let descriptor = wgpu::BufferDescriptor {
+                label: Some(label),
+                size: size as u64,
+                usage: usage | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            };
+            device.device.create_buffer(&descriptor)
+        };
+        let storage = wgpu::BufferUsages::STORAGE;
+        Self {
+            device,
+            job: buffer("job", size_of::<Job>(), wgpu::BufferUsages::UNIFORM),
+            points: buffer("points", CHUNK * size_of::<Point>(), storage),
+            cells: buffer("cells", CELLS * 16, storage),
+            band: buffer("band", 8 * pixels, storage | wgpu::BufferUsages::COPY_SRC),
+            pairs: 4e6,
+        }
+    }
+
+    /// Adds a set to the band: cells are prepared on the CPU while those before are summed.
+    fn sum(&mut self, band: &Band, set: &Set, progress: &Progress) -> Result<()> {
+        let job = Job { width: band.grid.width as u32, height: band.rows as u32, ..set.job };
+        self.device.queue.write_buffer(&self.job, 0, bytemuck::bytes_of(&job));
+        let pipeline = &self.device.pipelines[set.pipeline];
+        let bound = [&self.job, &self.points, &self.cells, &set.edges, &self.band];
+        let entries: Vec<wgpu::BindGroupEntry> = (0..)
+            .zip(bound)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .collect();
+        let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        let size = size_of::<Point>() * set.members.len().max(1);
+        let together = (WAVE as usize / size).max(1);
+        let cells = band.cells();
+        let waves: Vec<&[[usize; 2]]> = cells.chunks(together).collect();
+        let prepare = |wave: &[[usize; 2]]| -> Vec<([usize; 2], Vec<Point>)> {
+            wave.par_iter().filter(|_| !progress.stopped()).map(|&cell| (cell, band.points(set, cell))).collect()
+        };
+        let mut ready = waves.first().map(|wave| prepare(wave)).unwrap_or_default();
+        for i in 0..waves.len() {
+            let now = std::mem::take(&mut ready);
+            let next = waves.get(i + 1).copied().unwrap_or_default();
+            let (later, done) = rayon::join(|| prepare(next), || self.dispatch(pipeline, &group, &now, band, progress));
+            done?;
+            ready = later;
+        }
+        Ok(())
+    }
+
+    /// Sums prepared cells, as many points at once as keep the wanted time.
+    fn dispatch(
+        &mut self,
+        pipeline: &wgpu::ComputePipeline,
+        group: &wgpu::BindGroup,
+        prepared: &[([usize; 2], Vec<Point>)],
+        band: &Band,
+        progress: &Progress,
+    ) -> Result<()> {
+        let pixels =
+            |[column, row]: [usize; 2]| (CELL.min(band.grid.width - column) * CELL.min(band.rows - row)) as f64;
+        let (mut points, mut cells, mut pairs) = (Vec::new(), Vec::new(), 0.0);
+        for (at, all) in prepared {
+            let mut rest = &all[..];
+            while !rest.is_empty() {
+                let fits = ((self.pairs - pairs) / pixels(*at)).max(16.0) as usize;
+                let (now, later) = rest.split_at(fits.min(CHUNK - points.len()).min(rest.len()));
+                cells.push([at[0] as u32, at[1] as u32, points.len() as u32, now.len() as u32]);
+                points.extend_from_slice(now);
+                pairs += pixels(*at) * now.len() as f64;
+                rest = later;
+                if pairs >= self.pairs || points.len() == CHUNK || cells.len() == CELLS {
+                    self.submit(pipeline, group, &points, &cells, progress)?;
+                    (points.clear(), cells.clear());
+                    pairs = 0.0;
+                }
+            }
+            progress.advance(all.len() as u64);
+        }
+        if cells.is_empty() { Ok(()) } else { self.submit(pipeline, group, &points, &cells, progress) }
+    }
+
+    fn submit(
+        &mut self,
+        pipeline: &wgpu::ComputePipeline,
+        group: &wgpu::BindGroup,
+        points: &[Point],
+        cells: &[[u32; 4]],
+        progress: &Progress,
+    ) -> Result<()> {
+        progress.check()?;
+        let start = Instant::now();
+        let queue = &self.device.queue;
+        queue.write_buffer(&self.points, 0, bytemuck::cast_slice(points));
+        queue.write_buffer(&self.cells, 0, bytemuck::cast_slice(cells));
+        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, group, &[]);
+            pass.dispatch_workgroups(TILES, cells.len() as u32, 1);
+        }
+        let submission = queue.submit([encoder.finish()]);
+        self.device.wait(Some(submission))?;
+        let spent = start.elapsed();
+        if spent < DISPATCH / 2 {
+            self.pairs *= 2.0;
+        } else if spent > 2 * DISPATCH {
+            self.pairs = (0.5 * self.pairs).max(1e5);
+        }
+        Ok(())
+    }
+
+    /// Begins to fetch the band, and leaves it dark for the next.
+    fn read_back(&self, band: &Band) -> Readback {
+        let size = 8 * (band.grid.width * band.rows) as u64;
+        let staging = self.device.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("staging"),
+            size,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(&self.band, 0, &staging, 0, size);
+        encoder.clear_buffer(&self.band, 0, None);
+        self.device.queue.submit([encoder.finish()]);
+        let (sender, mapped) = channel();
+        staging.map_async(wgpu::MapMode::Read, .., move |result| {
+            // The receiver is gone where the computation was given up.
+            let _ = sender.send(result.map_err(|e| e.to_string()));
+        });
+        Readback { first: band.first, staging, mapped }
+    }
+}
+
+/// Cells of one dispatch: what every adapter takes as workgroups along an axis.
+const CELLS: usize = 65_535;
+
+/// A band on its way to the host.
+struct Readback {
+    first: usize,
+    staging: wgpu::Buffer,
+    mapped: Receiver<std::result::Result<(), String>>,
+}
+
+impl Readback {
+    fn add_to(self, device: &Device, field: &mut Field) -> Result<()> {
+        let mapped = loop {
+            match self.mapped.try_recv() {
+                Ok(mapped) => break mapped,
+                Err(_) => device.wait(None)?,
+            }
+        };
+        mapped.map_err(|what| device.failed(what))?;
+        let bytes = self.staging.slice(..).get_mapped_range();
+        let samples: &[Complex32] = bytemuck::cast_slice(&bytes);
+        let from = self.first * field.grid.width;
+        let to = &mut field.samples[from..from + samples.len()];
+        to.par_chunks_mut(1 << 16).zip(samples.par_chunks(1 << 16)).for_each(|(to, from)| {
+            to.iter_mut().zip(from).for_each(|(u, add)| *u += add);
+        });
+        Ok(())
+    }
+}
