@@ -8,7 +8,8 @@ use holodrive::hologram::{self, HologramSettings};
 use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Frame, Illumination, PanelProfile};
 use holodrive::pipeline;
-use holodrive::points::PointSource;
+use holodrive::points::trace::MirrorDepth;
+use holodrive::points::{Placement, PointSource};
 use holodrive::progress::Progress;
 use holodrive::propagation;
 use holodrive::reconstruction::{self, Picture, View};
@@ -187,6 +188,71 @@ fn each_letter_of_the_depth_chart_is_upright_and_sharp_at_its_own_depth_only() {
             assert!(alike < 0.9 * likeness, "letter {cell} {name}: {alike}, upright {likeness}");
         }
         println!("letter {cell} at z = {:.1} mm: correlation {likeness:.3}", depths[cell] * 1e3);
+    }
+}
+
+/// Means of a picture over blocks of pixels in a square, as one row of blocks per row: speckle averages out.
+fn blocks(values: &[f32], width: usize, [left, top]: [usize; 2], size: usize, block: usize) -> Vec<Vec<f32>> {
+    let mean = |r: usize, c: usize| {
+        let pixels =
+            (0..block * block).map(|k| values[(top + r * block + k / block) * width + left + c * block + k % block]);
+        pixels.sum::<f32>() / (block * block) as f32
+    };
+    (0..size / block).map(|r| (0..size / block).map(|c| mean(r, c)).collect()).collect()
+}
+
+#[test]
+fn what_a_ball_and_a_block_show_is_sharp_where_the_eye_focuses_and_blurred_at_path_length() {
+    // A miniature of the room: what is seen in the mirror ball and through the glass block, at the depth of either rule.
+    let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/mirror-ball.gltf");
+    let profile = PanelProfile::generic().expect("profile");
+    let grid = profile.grid().expect("grid");
+    let side = 450;
+    let lit = |mirror_depth| {
+        let mut settings = pipeline::SceneSettings {
+            placement: Placement::Model { z: -0.15, eye: 0.6, scale: None },
+            ..Default::default()
+        };
+        (settings.trace.width, settings.trace.height) = (side as u32, side as u32);
+        settings.trace.mirror_depth = mirror_depth;
+        pipeline::light(&scene, &settings, &grid, WAVELENGTH, &Progress::new()).expect("light")
+    };
+    let (focus, path) = (lit(MirrorDepth::Focus), lit(MirrorDepth::Path));
+    let points = &focus.placed.cloud.points;
+    let plan = hologram::plan(points, &grid, WAVELENGTH, &HologramSettings::default()).expect("plan");
+    let field = hologram::compute(points, &grid, WAVELENGTH, &plan, &Progress::new()).expect("field").field;
+    let target: Vec<f32> = focus.view.picture.iter().map(|rgb| rgb[1]).collect();
+    // Squares of the picture: inside the ball's outline, and on the block.
+    for (name, corner, size) in [("ball", [130, 270], 64), ("block", [285, 330], 48)] {
+        let pixels: Vec<usize> =
+            (0..size * size).map(|k| (corner[1] + k / size) * side + corner[0] + k % size).collect();
+        let depth = |view: &pipeline::SceneView| {
+            let mut z: Vec<f64> = pixels.iter().filter_map(|&p| view.depths[p]).collect();
+            z.sort_by(f64::total_cmp);
+            z[z.len() / 2]
+        };
+        let wanted = blocks(&target, side, corner, size, 4);
+        let [own, other] = [depth(&focus.view), depth(&path.view)].map(|z| {
+            let half = focus.view.placing.view_at(z);
+            let seen = reconstruction::picture(
+                &field,
+                &View::Plane { z },
+                half,
+                (side, side),
+                &Default::default(),
+                &Progress::new(),
+            );
+            let seen = seen.expect("picture").values;
+            (z, correlation(&blocks(&seen, side, corner, size, 4), &wanted))
+        });
+        println!(
+            "{name}: likeness {:.3} at its focus {:.2} mm, {:.3} at its path {:.2} mm",
+            own.1,
+            own.0 * 1e3,
+            other.1,
+            other.0 * 1e3
+        );
+        assert!(own.1 > 0.8 && own.1 > 1.2 * other.1, "{name}: {own:?} {other:?}");
     }
 }
 

@@ -7,7 +7,8 @@ use holodrive::units;
 use std::path::PathBuf;
 
 pub(crate) use super::scene_args::{
-    ColorArgs, DepthArg, FormFactorArg, PhaseArg, PlacementArg, PlacementArgs, SceneArgs, Wavelengths, White,
+    ColorArgs, DepthArg, FormFactorArg, MirrorDepthArg, PhaseArg, PlacementArg, PlacementArgs, SceneArgs, Wavelengths,
+    White,
 };
 
 const EXIT_CODES: &str = "\

@@ -33,12 +33,21 @@ pub(super) fn report_light(lit: &Lit, elapsed: f64, report: &mut Report) {
     {
         report.add(key, value.to_array().to_vec(), "");
     }
+    report.add("lamp_images", light.lamp_images, "");
+    report.add("photons", light.photons, "");
+    let mut optics = String::new();
+    if light.lamp_images > 0 {
+        optics += &format!(", {} mirror images of lamps", count(light.lamp_images));
+    }
+    if light.photons > 0 {
+        optics += &format!(", {} photons by way of optics", count(light.photons));
+    }
     report.add("light_residual", light.convergence.residual, "");
     report.add(
         "light_seconds",
         light.seconds,
         format!(
-            "light        {:>8}  {} patches, {} iterations to a residual of {:.1e}; energy in = absorbed + escaped within {:.2} %",
+            "light        {:>8}  {} patches{optics}, {} iterations to a residual of {:.1e}; energy in = absorbed + escaped within {:.2} %",
             seconds(light.seconds),
             count(light.patches),
             light.convergence.iterations,

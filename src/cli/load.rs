@@ -1,8 +1,8 @@
 //! What was typed, resolved: panel, settings, and the points of whatever input there is.
 
 use super::args::{
-    ChannelArg, ColorArgs, DepthArg, EngineArg, FormFactorArg, HologramArgs, PanelArgs, PhaseArg, PlacementArg,
-    PlacementArgs, SceneArgs, Wavelengths, White,
+    ChannelArg, ColorArgs, DepthArg, EngineArg, FormFactorArg, HologramArgs, MirrorDepthArg, PanelArgs, PhaseArg,
+    PlacementArg, PlacementArgs, SceneArgs, Wavelengths, White,
 };
 use super::light::{report_cloud, report_light};
 use super::report::Report;
@@ -15,7 +15,7 @@ use holodrive::pipeline::{self, Lit, SceneSettings};
 use holodrive::points::colour::Lasers;
 use holodrive::points::exposure::Exposure;
 use holodrive::points::placement::Phase;
-use holodrive::points::trace::TraceSettings;
+use holodrive::points::trace::{MirrorDepth, TraceSettings};
 use holodrive::points::{Channel, Placement, PointCloud, images, ply};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::Picture;
@@ -82,6 +82,7 @@ pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, defau
             form_factor,
             bounces: light.bounces,
             final_gather: light.final_gather,
+            photons: light.photons,
             seed: light.seed,
             ..IlluminationSettings::default()
         },
@@ -89,6 +90,10 @@ pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, defau
             width: light.rays.0 as u32,
             height: light.rays.1 as u32,
             bounces: light.bounces,
+            mirror_depth: match light.mirror_depth {
+                MirrorDepthArg::Path => MirrorDepth::Path,
+                MirrorDepthArg::Focus => MirrorDepth::Focus,
+            },
             seed: light.seed,
             ..TraceSettings::default()
         },

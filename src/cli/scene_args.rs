@@ -65,9 +65,16 @@ pub(crate) struct SceneArgs {
         value_parser = clap::value_parser!(u32).range(1..=1_000_000)
     )]
     pub(crate) final_gather: Option<u32>,
-    /// Most mirror reflections along a ray.
-    #[arg(long, default_value_t = 8, value_name = "N")]
+    /// Most mirrors and glass surfaces on a path of light.
+    #[arg(long, default_value_t = 32, value_name = "N")]
     pub(crate) bounces: u32,
+    /// Depth of what is seen by way of mirrors and glass: where the eye focuses, or the length of the path as in the
+    /// seed paper (the same for flat mirrors).
+    #[arg(long, value_enum, default_value_t = MirrorDepthArg::Focus)]
+    pub(crate) mirror_depth: MirrorDepthArg,
+    /// Photons that lamps send through curved mirrors and glass (caustics); none are sent where there is none.
+    #[arg(long, default_value_t = 400_000, value_name = "N")]
+    pub(crate) photons: u32,
     /// Seed of all random numbers.
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub(crate) seed: u64,
@@ -77,6 +84,12 @@ pub(crate) struct SceneArgs {
 pub(crate) enum FormFactorArg {
     Exact,
     Paper,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MirrorDepthArg {
+    Path,
+    Focus,
 }
 
 /// Where the scene stands before the panel.

@@ -19,8 +19,11 @@ const LOBE_RAYS: f32 = 16.0;
 const FAINT: f32 = 0.01;
 /// Ways followed at once; further ones are chosen from by chance.
 const MOST_WAYS: usize = 48;
-/// An image nearer than this part of the way, or farther than its inverse, or behind the eye, is put at that distance.
-const NEAREST: f64 = 0.02;
+/// An image nearer than this part of the way to the first mirror or glass is put at that distance,
+const NEAREST: f64 = 0.25;
+/// and one farther than this many times the whole way, or behind the eye, at that: a few rays that pass a focus of
+/// curved glass must not stretch the depth of the whole picture.
+const FARTHEST: f64 = 4.0;
 
 /// Light by one way.
 #[derive(Clone, Copy, Debug)]
@@ -70,6 +73,8 @@ struct Branch {
     ray: Ray,
     weight: Vec3,
     path: f64,
+    /// Way to the first surface [m].
+    first: f64,
     bounces: u32,
     /// Geometric normal of the surface that it leaves.
     leaving: Option<DVec3>,
@@ -108,6 +113,7 @@ impl Eye<'_> {
             ray,
             weight: Vec3::ONE,
             path: 0.0,
+            first: 0.0,
             bounces: 0,
             leaving: None,
             wave: Wavefront::new(ray.direction),
@@ -144,6 +150,9 @@ impl Eye<'_> {
         };
         let Some(hit) = hit else { return };
         branch.path += hit.distance;
+        if branch.bounces == 0 {
+            branch.first = branch.path;
+        }
         let surface = Surface::at(bvh.scene(), &hit, self.footprint(branch.path));
         if branch.bounces == 0 && branch.leaving.is_none() {
             seen.first = hit.triangle;
@@ -216,8 +225,9 @@ impl Eye<'_> {
         if self.settings.mirror_depth == MirrorDepth::Path || branch.bounces == 0 {
             return branch.path;
         }
-        let vergence = branch.wave.vergence(branch.ray.direction) * branch.path;
-        if vergence.is_nan() { branch.path } else { branch.path / vergence.clamp(NEAREST, 1.0 / NEAREST) }
+        let vergence = branch.wave.vergence(branch.ray.direction);
+        let (nearest, farthest) = (NEAREST * branch.first, FARTHEST * branch.path);
+        if vergence.is_nan() { branch.path } else { 1.0 / vergence.clamp(1.0 / farthest, 1.0 / nearest) }
     }
 }
 

@@ -1,11 +1,11 @@
 //! Point sources: what the scene's light becomes before it is a wave.
 
-mod eye;
-#[cfg(test)]
-mod eye_tests;
 pub mod budget;
 pub mod colour;
 pub mod exposure;
+mod eye;
+#[cfg(test)]
+mod eye_tests;
 pub mod images;
 pub mod placement;
 pub mod ply;
