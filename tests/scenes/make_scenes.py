@@ -331,8 +331,33 @@ def depth_chart():
     scene.write(embed=True)
 
 
+def glass_block():
+    scene = Gltf("glass-block", "Small glowing letters close behind a thick block of glass: the eye focuses on them nearer "
+                 "by t(1 - 1/n) than they are. The block does not absorb.")
+    glow = scene.add("materials", emitter("glow", (1.0, 1.0, 1.0), 1.0))
+    corners = []
+    for row in range(4):
+        for column in range(4):
+            letter = LETTERS["FGJR"[(row + column) % 4]]
+            corners += [((x - 2.5 + 7 * (column - 1.5)) * 0.018, (y - 3.5 + 9 * (1.5 - row)) * 0.018, 0.0)
+                        for stroke in letter for x, y in stroke]
+    triangles = [t for i in range(0, len(corners), 4) for t in ((i, i + 1, i + 2), (i, i + 2, i + 3))]
+    letters = scene.add_shape(corners, [(0.0, 0.0, 1.0)] * len(corners), triangles)
+    scene.add_node("letters", mesh=scene.add_mesh("letters", letters, glow), translation=[0.0, 0.0, -1.5],
+                   extras={"depth": 1.5})
+    clear = glass("glass", 0.8)
+    del clear["extensions"]["KHR_materials_volume"]["attenuationDistance"]
+    del clear["extensions"]["KHR_materials_volume"]["attenuationColor"]
+    block = scene.add_mesh("glass block", scene.add_shape(*box(bottom=True)), scene.add("materials", clear))
+    scene.add_node("glass block", mesh=block, translation=[0.0, -0.5, -1.0], scale=[1.0, 1.0, 0.8],
+                   extras={"thickness": 0.8, "index": 1.5})
+    scene.add_camera(2 * math.atan(0.5), [0.003, 0.004, 0.0])
+    scene.write(embed=True)
+
+
 if __name__ == "__main__":
     SCENES.mkdir(exist_ok=True)
     cornell()
     mirror_ball()
     depth_chart()
+    glass_block()

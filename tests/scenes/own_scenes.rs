@@ -192,3 +192,15 @@ fn every_scene_says_what_it_is_for() {
     }
     assert!(count >= 3);
 }
+
+#[test]
+fn the_letters_behind_the_glass_block_are_small_and_the_block_is_thick() {
+    let scene = own("glass-block.gltf");
+    let glass = scene.materials.iter().find(|m| m.name == "glass").expect("glass");
+    assert_eq!((glass.transmission, glass.ior), (1.0, 1.5));
+    assert!(glass.thickness > 0.0 && glass.attenuation_distance.is_infinite());
+    let (low, high) = scene.bounds().expect("triangles");
+    assert!(close(low, DVec3::new(-0.5, -0.5, -1.5)) && close(high, DVec3::new(0.5, 0.5, -0.6)), "{low} {high}");
+    let letters = scene.triangles.iter().filter(|t| scene.materials[t.material as usize].name == "glow");
+    assert!(letters.flat_map(Triangle::corners).all(|p| (p.z + 1.5).abs() < 1e-6));
+}
