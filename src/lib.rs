@@ -45,12 +45,12 @@
 //! 6. [`field`]: complex samples on a grid; index ↔ metre ↔ cycles/m; Fourier transforms; `.npy`
 //! 7. [`scene`]: glTF, triangles, materials, textures, lights, cameras, ray casting
 //! 8. [`illumination`]: light arriving on surfaces: form factors, radiosity, direct light
-//! 9. [`points`]: rays to point sources; placement before the panel; PLY; pictures with depth
+//! 9. [`points`]: rays to point sources; how many, how bright, for which lasers; placement before the panel; PLY
 //! 10. [`propagation`]: plane to plane
 //! 11. [`hologram`]: points to the field on the panel: oracle, engines, planner
 //! 12. [`panel`]: profiles, frames of drive levels, packing, the simulated panel
 //! 13. [`encode`]: field to phase or fringes for a panel's levels and range
-//! 14. [`reconstruction`]: field to pictures, and how good they are
+//! 14. [`reconstruction`]: field to pictures, gray or in three lasers' colours, and how good they are
 //! 15. [`pipeline`]: the whole way, on one screen
 //! 16. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols
 //! 17. [`display`]: monitors and the fullscreen window (feature `display`)

@@ -1,5 +1,6 @@
 //! Colour through the whole way: lamps of known colours come back as those colours, in their places.
 
+use glam::DVec3;
 use holodrive::encode::{EncodeSettings, Encoding};
 use holodrive::hologram::HologramSettings;
 use holodrive::panel::PanelProfile;
@@ -135,7 +136,7 @@ fn lamps_come_back_in_their_colours_at_their_places() {
 fn a_scene_of_one_colour_leaves_the_other_lasers_dark() {
     let cloud = holodrive::points::PointCloud {
         points: vec![holodrive::points::PointSource {
-            position: glam::DVec3::new(0.0, 0.0, -0.1),
+            position: DVec3::new(0.0, 0.0, -0.1),
             amplitude: 1.0,
             phase: 0.0,
         }],
@@ -148,6 +149,30 @@ fn a_scene_of_one_colour_leaves_the_other_lasers_dark() {
     // Rec.709's blue lies beyond the green–blue side of the triangle: moved onto it, it needs no red.
     assert!(fields.computed[0].is_none() && fields.computed[1].is_some() && fields.computed[2].is_some());
     assert_eq!(fields.gamut.outside_points, 1);
+}
+
+#[test]
+fn waves_reach_the_eye_in_step_in_each_laser() {
+    use holodrive::points::{Channel, PointCloud, PointSource};
+    let eye = DVec3::new(0.0, 0.0, 0.6);
+    let at = |x, z| PointSource { position: DVec3::new(x, 1e-4, z), amplitude: 1.0, phase: 0.0 };
+    let cloud = PointCloud { points: vec![at(1e-4, -0.1), at(-2e-4, -0.12)], rgb: None };
+    let grid = panel().grid().expect("grid");
+    let lasers = Lasers::new([638e-9, 520e-9, 450e-9]).expect("lasers");
+    let (settings, progress) = (HologramSettings::default(), Progress::new());
+    let fields = pipeline::color_fields(&cloud, &lasers, Some(eye), &grid, &settings, &progress).expect("fields");
+    for (computed, wavelength) in fields.computed.iter().zip(lasers.wavelengths()) {
+        let mut own = cloud.clone();
+        for point in &mut own.points {
+            // −k·distance, whole turns left out.
+            point.phase = -std::f64::consts::TAU * (((eye - point.position).length() / wavelength) % 1.0);
+        }
+        let expected =
+            pipeline::field(&own, Channel::Luminance, &grid, wavelength, &settings, &progress).expect("field").field;
+        let found = &computed.as_ref().expect("light").field;
+        let off: f64 = found.samples.iter().zip(&expected.samples).map(|(a, b)| f64::from((a - b).norm_sqr())).sum();
+        assert!(off < 1e-8 * expected.energy(), "{wavelength}: {off}");
+    }
 }
 
 #[test]

@@ -81,7 +81,8 @@ pub(super) fn report_light(lit: &Lit, elapsed: f64, report: &mut Report) {
 
 /// What a budget chose, and why.
 fn report_budget(rays: &Rays, lit: &Lit, report: &mut Report) {
-    let [eye, panel] = [rays.resolution.eye, rays.resolution.panel].map(|[x, y]| format!("{x:.0} × {y:.0}"));
+    let [eye, panel] =
+        [rays.resolution.eye, rays.resolution.panel].map(|[x, y]| format!("{:.0} × {:.0}", x.floor(), y.floor()));
     let why = match rays.limit {
         Limit::Budget => "as asked",
         Limit::Eye => "all that the eye resolves",

@@ -76,6 +76,7 @@ pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, defau
             camera: light.camera.as_deref().map(Choice::from),
             clip: light.animation.as_deref().map_or(Clip::First, |name| Clip::Of(Choice::from(name))),
             time: light.time,
+            viewer_light: light.viewer_light,
             ..LoadOptions::default()
         },
         illumination: IlluminationSettings {

@@ -51,6 +51,9 @@ pub(crate) struct SceneArgs {
     /// Time in the animation [s].
     #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
     pub(crate) time: f64,
+    /// Add the light that a file without any gets, from the viewer's upper left and the camera, to the file's own.
+    #[arg(long)]
+    pub(crate) viewer_light: bool,
     /// Form factors: exact (1/π, polygons), or the seed paper's eq. (1) for comparison (half of the light is lost).
     #[arg(long, value_enum, default_value_t = FormFactorArg::Exact)]
     pub(crate) form_factor: FormFactorArg,

@@ -362,8 +362,7 @@ mod tests {
 
     #[test]
     fn every_placement_shows_the_rays_picture_unsqueezed() {
-        // A square picture on a panel of 16 : 9, as a window and as a model: the corner of the picture is the corner of
-        // the window, and the window has the picture's shape.
+        // The corner of the picture is the corner of the window, whatever the shapes of picture and panel.
         for placement in [Placement::default(), Placement::Model { eye: 0.5, z: -0.2, scale: None }] {
             for aspect in [1.0, 2.5, 16.0 / 9.0] {
                 let placing = placement.prepare(&scene(), &camera(), aspect, &panel()).expect("placing");

@@ -275,6 +275,12 @@ fn without_light_a_stated_one_stands_in() {
     let distance = fill.position.distance((0.5 * (low + high)).as_vec3());
     assert!((fill.intensity.x / distance.powi(2) - 0.8).abs() < 1e-4);
 
+    // On request it is added to a file's own light, without a word.
+    let own = Builder::triangle().load().expect("an emitter").scene;
+    let options = LoadOptions { viewer_light: true, ..LoadOptions::default() };
+    let both = Builder::triangle().load_with(&options).expect("an emitter");
+    assert!(own.lights.is_empty() && both.scene.lights.len() == 2 && !warns(&both, "no light"));
+
     // What is unlit shows without light.
     file.json["materials"] = json!([{"extensions": {"KHR_materials_unlit": {}}}]);
     let unlit = file.load().expect("loads");

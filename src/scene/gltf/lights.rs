@@ -69,14 +69,19 @@ fn kind(document: &Document, light: &Light, what: &str) -> Result<LightKind> {
     }
 }
 
-/// Sees to it that the scene is lit: a file without any light gets the default of [`super::load`]; one whose lights
-/// have all been turned down to zero is refused, since that is hardly what was meant.
+/// Sees to it that the scene is lit: a file without any light gets the default of [`super::load`], as does one for which
+/// it is wanted; one whose lights have all been turned down to zero is refused, since that is hardly what was meant.
 pub(super) fn ensure_light(
     document: &Document,
     scene: &mut Scene,
     used: &UsedMaterials,
+    wanted: bool,
     warnings: &mut Vec<Warning>,
 ) -> Result<()> {
+    if wanted {
+        viewer_light(scene);
+        return Ok(());
+    }
     // The coarsest level is the mean of the picture: some exporters write full emission times a black picture.
     let mean = |t: &TextureRef| {
         let texture = scene.textures.get(t.texture as usize)?;
@@ -100,7 +105,16 @@ pub(super) fn ensure_light(
              zero, or remove them all for a default light",
         ));
     }
+    viewer_light(scene);
+    warnings.push(Warning(format!(
+        "the file has no light; it is lit by a directional light of {KEY_IRRADIANCE} W/m² from the viewer's upper left \
+         and a point light at the camera that gives {FILL_IRRADIANCE} W/m² at the middle of the scene"
+    )));
+    Ok(())
+}
 
+/// Adds the light of a file without any.
+fn viewer_light(scene: &mut Scene) {
     let camera = &scene.cameras[0];
     let eye = camera.eye();
     let from = camera.world_from_camera.transform_vector3(KEY_FROM.normalize());
@@ -121,9 +135,4 @@ pub(super) fn ensure_light(
         intensity: Vec3::splat(FILL_IRRADIANCE * distance * distance),
         range: f32::INFINITY,
     });
-    warnings.push(Warning(format!(
-        "the file has no light; it is lit by a directional light of {KEY_IRRADIANCE} W/m² from the viewer's upper left \
-         and a point light at the camera that gives {FILL_IRRADIANCE} W/m² at the middle of the scene"
-    )));
-    Ok(())
 }

@@ -83,6 +83,8 @@ pub struct LoadOptions {
     pub clip: Clip,
     /// Time in the clip [s]; before its first or after its last key the pose of that key is held.
     pub time: f64,
+    /// Whether the light that a file without any gets is added to the file's own.
+    pub viewer_light: bool,
 }
 
 /// A scene and what had to be assumed to make it.
@@ -98,7 +100,8 @@ pub struct Loaded {
 ///
 /// A file that lights nothing (no emission, no punctual light, not everything unlit) is lit by a directional light of
 /// irradiance 2.2 W/m² from the viewer's upper left and by a point light at the first camera that gives 0.8 W/m² at the
-/// middle of the scene, so that a white surface square to both has a radiance of about 1 W/(m² sr).
+/// middle of the scene, so that a white surface square to both has a radiance of about 1 W/(m² sr). The same light is
+/// added to the file's own on request: a lamp that shines away from the viewer is else a dark shape.
 ///
 /// # Errors
 ///
@@ -120,6 +123,6 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     let lights = lights::read(&document, &nodes)?;
 
     let mut scene = Scene { triangles, materials, textures, lights, cameras };
-    lights::ensure_light(&document, &mut scene, &used_materials, &mut warnings)?;
+    lights::ensure_light(&document, &mut scene, &used_materials, options.viewer_light, &mut warnings)?;
     Ok(Loaded { scene, warnings })
 }
