@@ -21,6 +21,8 @@ const PROBE_SIDE: usize = 8;
 const DRAWN_IN: f64 = 0.02;
 /// Height above an element, over its longest edge, at which its points look at each other.
 const LIFT: f64 = 0.005;
+/// Shortest edge of an element that something cuts through, over that of others.
+const CUT_FINENESS: f64 = 0.5;
 /// A vertex that sees hardly anything but the backs of one-sided surfaces stands inside a body.
 const BURIED: f32 = 0.9;
 
@@ -165,7 +167,16 @@ impl<'s> Elements<'s> {
                 break;
             }
         }
+        // Where something cuts through, pieces are made smaller: their light is known less well.
         mesh.doubt(bvh);
+        let cut = |mesh: &Self, e: usize| {
+            mesh.elements[e].doubtful && mesh.longest_edge(e) > CUT_FINENESS * fineness.shortest
+        };
+        while mesh.split_where_once(fineness, cut) {
+            mesh.probe(bvh, probed, seed);
+            probed = mesh.vertices.len();
+            mesh.doubt(bvh);
+        }
         mesh.shared = HashMap::new();
         mesh
     }
@@ -204,7 +215,11 @@ impl<'s> Elements<'s> {
             let vertex = &self.vertices[element.corners[k as usize] as usize];
             !vertex.buried && !bvh.occluded(point + lift, self.place(Sender { element: e, corner: Some(k) }) + lift)
         };
-        order.iter().find(seen).map(|&k| first + u32::from(k))
+        // A body that stands in the element hides corners by its own edges, too: what is outside of it is then one side.
+        let buried = |k: u8| self.vertices[element.corners[k as usize] as usize].buried;
+        let in_a_body = order.iter().any(|&k| buried(k));
+        let outside = || order.iter().find(|&&k| in_a_body && !buried(k));
+        order.iter().find(seen).or_else(outside).map(|&k| first + u32::from(k))
     }
 
     /// Where a corner's light is measured and seen: near it, inside the element [m].

@@ -24,6 +24,8 @@ const LEAST_CONTRAST: f64 = 3.0;
 /// More emitting polygons than this are not sampled one by one: the weakest ones then light through radiosity.
 const MOST_EMITTERS: usize = 128;
 
+/// Tries to find a point of an emitter that lies above the horizon.
+pub(crate) const MOST_REDRAWS: u32 = 32;
 /// Halvings of a near emitter's sides: pieces of 1/32 of its size.
 const MOST_CUTS: u32 = 5;
 /// Weights of corner 1 and the last one at the corners that span an emitter.
@@ -361,15 +363,20 @@ impl Tally {
                 }
                 (u, v) = (random.uniform(), random.uniform());
             }
-            let (at, weights) = emitter.within(&pieces[piece], u, v);
-            if pieces.len() > 1 {
-                self.shoot(around, emitter, point, at, weights, 1.0);
-                continue;
+            let above = (point - emitter.corners[0]).dot(emitter.normal) >= 0.0;
+            let lit_side = if above { emitter.normal } else { -emitter.normal };
+            let (mut at, mut weights) = emitter.within(&pieces[piece], u, v);
+            let mut weight = point_to_element(point, normal, at, lit_side, 1.0);
+            // What lies below the horizon is drawn anew: few rays must not all be spent on what gives no light.
+            for _ in 0..MOST_REDRAWS {
+                if weight > 0.0 {
+                    break;
+                }
+                (at, weights) = emitter.within(&pieces[piece], random.uniform(), random.uniform());
+                weight = point_to_element(point, normal, at, lit_side, 1.0);
             }
-            let lit_side = if (point - at).dot(emitter.normal) >= 0.0 { emitter.normal } else { -emitter.normal };
-            let weight = point_to_element(point, normal, at, lit_side, 1.0);
             if weight > 0.0 {
-                self.shoot(around, emitter, point, at, weights, weight);
+                self.shoot(around, emitter, point, at, weights, if pieces.len() > 1 { 1.0 } else { weight });
             }
         }
     }

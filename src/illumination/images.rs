@@ -5,7 +5,7 @@
 //! an image is the image's polygon clipped by the pyramids of these outlines: its form factor is exact, and rays decide
 //! only what stands in the way. Curved mirrors, glass and rough metal are left to photons (`photons`).
 
-use super::emitters::{Emitters, ShadowRays, punctual_light};
+use super::emitters::{Emitters, MOST_REDRAWS, ShadowRays, punctual_light};
 use super::flat_mirrors::{FlatMirror, clip, polygon_area};
 use super::form_factor::{point_to_element, point_to_polygon};
 use super::paths::{Optics, reflected};
@@ -308,9 +308,16 @@ impl Image {
                     let (shift, turn) = (random.uniform(), random.uniform());
                     for i in 0..count {
                         let u = (f64::from(i) + shift) / f64::from(count);
-                        let at = spread(&seen, u, (turn + f64::from(i) * GOLDEN).fract());
+                        let mut at = spread(&seen, u, (turn + f64::from(i) * GOLDEN).fract());
                         let away = if (point - at).dot(self.normal) >= 0.0 { self.normal } else { -self.normal };
-                        let weight = point_to_element(point, normal, at, away, 1.0);
+                        let mut weight = point_to_element(point, normal, at, away, 1.0);
+                        for _ in 0..MOST_REDRAWS {
+                            if weight > 0.0 {
+                                break;
+                            }
+                            at = spread(&seen, random.uniform(), random.uniform());
+                            weight = point_to_element(point, normal, at, away, 1.0);
+                        }
                         total += weight;
                         if weight > 0.0 {
                             let (tint, end) = self.follow(around, point, at, Some(*k));

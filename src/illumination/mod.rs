@@ -206,7 +206,9 @@ impl<'s> Illumination<'s> {
         for (direct, &sender) in patches.direct.iter_mut().zip(&senders.all) {
             *direct += mesh.mean_over(sender, &weak);
         }
-        let photons = photons::shoot(around, settings.photons, settings.seed ^ 0xf070, progress)?;
+        // Where nothing scatters no photon can end.
+        let count = if mesh.vertices.is_empty() { 0 } else { settings.photons };
+        let photons = photons::shoot(around, count, settings.seed ^ 0xf070, progress)?;
         patches.receive(bvh, &mesh, &senders, &photons);
         let caustics = Caustics::new(bvh, &photons);
         progress.check()?;

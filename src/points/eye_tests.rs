@@ -12,7 +12,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Means over squares of pixels by this crate and by plain paths, at a few places of a picture.
-fn agrees(room: &Room, camera: &Camera, squares: &[[f64; 2]], paths: u32, tolerance: f64) {
+pub(crate) fn agrees(room: &Room, camera: &Camera, squares: &[[f64; 2]], paths: u32, tolerance: f64) {
     let bvh = SceneBvh::new(&room.scene);
     let light = Illumination::new(&bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
     eprintln!("{:?}", light.report());
@@ -59,7 +59,7 @@ fn agrees(room: &Room, camera: &Camera, squares: &[[f64; 2]], paths: u32, tolera
 }
 
 /// A white box with a lamp in the ceiling.
-fn white_box(left: Material, right: Material) -> Room {
+pub(crate) fn white_box(left: Material, right: Material) -> Room {
     let mut room = Room::default();
     let white = room.material(Material::diffuse(Vec3::splat(0.7)));
     let (left, right) = (room.material(left), room.material(right));

@@ -7,6 +7,8 @@ mod eye;
 #[cfg(test)]
 mod eye_tests;
 pub mod images;
+#[cfg(test)]
+mod odd_tests;
 pub mod placement;
 pub mod ply;
 pub mod trace;
