@@ -109,9 +109,10 @@ impl Scene {
     pub fn material(&self, triangle: u32) -> &Material {
         &self.materials[self.triangles[triangle as usize].material as usize]
     }
-    /// Smallest box round all triangles (min, max) [m]; `None` without triangles.
+    /// Smallest box round all corners that are finite (min, max) [m]; `None` without any.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        self.triangles.iter().flat_map(Triangle::corners).fold(None, |bounds, p| match bounds {
+        let corners = self.triangles.iter().flat_map(Triangle::corners);
+        corners.filter(|p| p.is_finite()).fold(None, |bounds, p| match bounds {
             None => Some((p, p)),
             Some((low, high)) => Some((low.min(p), high.max(p))),
         })
