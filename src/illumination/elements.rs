@@ -21,8 +21,6 @@ const PROBE_SIDE: usize = 8;
 const DRAWN_IN: f64 = 0.02;
 /// Height above an element, over its longest edge, at which its points look at each other.
 const LIFT: f64 = 0.005;
-/// Shortest edge of an element that something cuts through, over that of others.
-const CUT_FINENESS: f64 = 0.5;
 /// A vertex that sees hardly anything but the backs of one-sided surfaces stands inside a body.
 const BURIED: f32 = 0.9;
 
@@ -167,16 +165,7 @@ impl<'s> Elements<'s> {
                 break;
             }
         }
-        // Where something cuts through, pieces are made smaller: their light is known less well.
         mesh.doubt(bvh);
-        let cut = |mesh: &Self, e: usize| {
-            mesh.elements[e].doubtful && mesh.longest_edge(e) > CUT_FINENESS * fineness.shortest
-        };
-        while mesh.split_where_once(fineness, cut) {
-            mesh.probe(bvh, probed, seed);
-            probed = mesh.vertices.len();
-            mesh.doubt(bvh);
-        }
         mesh.shared = HashMap::new();
         mesh
     }

@@ -147,8 +147,8 @@ pub struct IlluminationReport {
     pub seconds: f64,
 }
 
-/// Most gathering rays in all, so that their table stays below 100 MB.
-const MOST_GATHERING_RAYS: usize = 24_000_000;
+/// Most gathering rays in all: vertices beyond some tens of thousands lie so close that the noise of each counts less.
+const MOST_GATHERING_RAYS: usize = 8_000_000;
 /// Vertices at which images of lamps are compared.
 const MOST_PLACES: usize = 400;
 
