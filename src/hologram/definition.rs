@@ -118,8 +118,13 @@ impl Optics {
         let taper = self.taper[axis];
         let sine = self.wavelength * f;
         let q = (1.0 - sine * sine) / (PI * self.wavelength * r * taper.width * taper.width);
+        let v = (f - taper.middle) / taper.width;
+        // |exp(−v²/(1 − iq))| = exp(−v²/(1 + q²)): below e^{−40} = 4e-18 the edge is not there.
+        if v * v > 40.0 * (1.0 + q * q) {
+            return (Complex64::from(if v < 0.0 { 1.0 } else { 0.0 }), Complex64::default());
+        }
         let root = Complex64::new(1.0, -q).sqrt();
-        let v = Complex64::from((f - taper.middle) / taper.width) / root;
+        let v = Complex64::from(v) / root;
         (0.5 * erfc(v), -(-v * v).exp() / (root * (taper.width * PI.sqrt())))
     }
     /// The far form for a diverging wave of unit amplitude and phase zero, Δ and distance from the panel in metres.

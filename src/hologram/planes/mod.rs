@@ -141,11 +141,12 @@ impl Parameters {
             let tail = 2.0 * self.tail + 26.0;
             (tail + cone) + cone * cone / (3.0 * (tail + cone))
         };
-        let dab = 1.0e-6 + self.rank as f64 * area(0) * area(1) * 0.13e-9;
+        let dab = 0.75e-6 + self.rank as f64 * area(0) * area(1) * 0.1e-9;
         let levels: u64 = (0..2).map(|axis| Table::bytes(optics, axis, h, self.tail, self.table)).sum();
-        pixels * 5.5e-9 * ((self.planes * self.rank) as f64 + 1.0)
-            + cloud.sources.len() as f64 * dab
-            + levels as f64 * 1e-8
+        // The larger the transforms, the less of them stays in caches.
+        let pass = 7.5e-9 * (pixels / 5.5e6).powf(0.2);
+        let spectra = pixels * pass * ((self.planes * self.rank) as f64 + 1.0);
+        spectra + cloud.sources.len() as f64 * dab + levels as f64 * 1e-8
     }
     /// Memory beside points and field [bytes].
     pub(crate) fn bytes(&self, optics: &Optics, grid: &Grid, cloud: &Cloud) -> u64 {

@@ -9,6 +9,7 @@
 
 mod edge;
 mod kernel;
+mod pixels;
 mod shape;
 
 pub(crate) use edge::EdgeTable;
@@ -22,7 +23,8 @@ use super::sources::{Source, tilt};
 use crate::error::Result;
 use crate::field::{Field, Grid};
 use crate::progress::Progress;
-use kernel::{BATCH, Job, Panels, Relative, add_batch, add_exact};
+use kernel::{BATCH, Job, Panels, Relative, add_batch};
+use pixels::add_exact;
 use rayon::prelude::*;
 
 /// Tiles whose results wait together to be added to the field.
@@ -65,7 +67,7 @@ impl Class {
         let tile = if self.shape.exact {
             height * (4e-8 + width * 1.4e-9)
         } else {
-            2.5e-8 + 6e-10 * (width + height) + width * height * 7.5e-11
+            4e-8 + 6e-10 * (width + height) + width * height * 7.5e-11
         };
         let count = |source: &Source| {
             let spans = source.span(grid);
@@ -81,7 +83,8 @@ impl Class {
         };
         let parts: Vec<f64> =
             self.sources.par_chunks(4096).map(|part| part.iter().map(|&i| count(&sources[i])).sum()).collect();
-        parts.iter().sum::<f64>() * tile
+        let tiles = grid.width.div_ceil(self.shape.width) * grid.height.div_ceil(self.shape.height);
+        parts.iter().sum::<f64>() * tile + tiles as f64 * 5e-6
     }
     /// Distance of the nearest source [m].
     pub(crate) fn nearest(&self) -> f64 {
