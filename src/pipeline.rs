@@ -158,7 +158,7 @@ fn within_budget(
     let mut best: Option<(f64, Traced, Rays)> = None;
     // Fine structure may fool the first look; the second knows the finer grid's share.
     for _ in 0..3 {
-        let traced = cast(&TraceSettings { width: rays.size[0], height: rays.size[1], ..*settings })?;
+        let traced = cast(&TraceSettings { width: rays.size[0], height: rays.size[1], jitter: true, ..*settings })?;
         let off = match (budget, rays.limit) {
             (Budget::Points(count), Limit::Budget) => (traced.points.len() as f64 / count as f64).ln().abs(),
             _ => 0.0,
