@@ -201,7 +201,8 @@ fn a_budget_gives_as_many_points_and_keeps_the_edges() {
         for side in
             [edge(&|p| p.position.x), edge(&|p| -p.position.x), edge(&|p| p.position.y), edge(&|p| -p.position.y)]
         {
-            assert!(side <= 0.9 && side > 0.9 - cell, "{count}: {side}");
+            // Corners are rounded to single precision.
+            assert!(side <= 0.9 + 1e-5 && side > 0.9 - cell, "{count}: {side}");
         }
     }
     let eye = light(Budget::Eye, (500, 500));

@@ -259,10 +259,15 @@ impl<'s> Elements<'s> {
             if node.children == 0 {
                 return Some((at, weights));
             }
+            // Which half a point lies in is as good as random: a branch here would be mispredicted every other time.
             let [a, b, c] = weights;
             let second = usize::from(b > a);
-            let canonical = if second == 0 { [c, a - b, 2.0 * b] } else { [b - a, c, 2.0 * a] };
-            weights = rotated(canonical, node.rotations[second]);
+            let (apart, twice) = ((a - b).abs(), 2.0 * a.min(b));
+            let pair = [c, apart, c];
+            let (x, y) = (pair[second], pair[second + 1]);
+            let turned = [x, y, twice, x, y];
+            let by = usize::from(node.rotations[second]) % 3;
+            weights = [turned[by], turned[by + 1], turned[by + 2]];
             at = node.children + second as u32;
         }
     }

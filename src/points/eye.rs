@@ -62,10 +62,12 @@ impl Seen {
 
 /// An eye before a lit scene.
 pub(crate) struct Eye<'a> {
-    pub(crate) light: &'a Illumination<'a>,
-    pub(crate) camera: &'a Camera,
-    pub(crate) settings: &'a TraceSettings,
-    pub(crate) aspect: f64,
+    light: &'a Illumination<'a>,
+    camera: &'a Camera,
+    settings: &'a TraceSettings,
+    aspect: f64,
+    /// Width of a pixel at one metre, or anywhere in an orthographic picture [m].
+    pixel: f64,
 }
 
 /// A ray on its way.
@@ -84,7 +86,14 @@ struct Branch {
     share: u32,
 }
 
-impl Eye<'_> {
+impl<'a> Eye<'a> {
+    /// An eye that sees a lit scene through a camera.
+    pub(crate) fn new(light: &'a Illumination<'a>, camera: &'a Camera, settings: &'a TraceSettings) -> Self {
+        let aspect = f64::from(settings.width) / f64::from(settings.height);
+        let (_, half_height) = camera.half_size(aspect);
+        Self { light, camera, settings, aspect, pixel: 2.0 * half_height / f64::from(settings.height) }
+    }
+
     /// The ray through a place of the picture, in pixels.
     pub(crate) fn ray(&self, column: f64, row: f64) -> Ray {
         let (u, v) = (column / f64::from(self.settings.width), row / f64::from(self.settings.height));
@@ -93,8 +102,7 @@ impl Eye<'_> {
 
     /// Width of a pixel at a distance along its ray [m].
     fn footprint(&self, distance: f64) -> f64 {
-        let (_, half_height) = self.camera.half_size(self.aspect);
-        let at_one_metre = 2.0 * half_height / f64::from(self.settings.height);
+        let at_one_metre = self.pixel;
         match self.camera.projection {
             Projection::Perspective { .. } => at_one_metre * distance,
             Projection::Orthographic { .. } => at_one_metre,
@@ -174,7 +182,8 @@ impl Eye<'_> {
             seen.radiance += radiance;
             ends.push(End { radiance, depth, bounces: branch.bounces.min(255) as u8, group });
         }
-        if surface.unlit || branch.bounces >= self.settings.bounces {
+        let bends = surface.is_specular() || surface.transmission.max_element() > 0.0;
+        if surface.unlit || !bends || branch.bounces >= self.settings.bounces {
             return;
         }
         // One look tells how strong the ways are; for a rough surface each ray of its lobe looks again.

@@ -18,7 +18,7 @@ pub(crate) fn agrees(room: &Room, camera: &Camera, squares: &[[f64; 2]], paths: 
     eprintln!("{:?}", light.report());
     let oracle = Oracle::new(&bvh);
     let settings = TraceSettings { width: 1000, height: 1000, ..TraceSettings::default() };
-    let eye = Eye { light: &light, camera, settings: &settings, aspect: 1.0 };
+    let eye = Eye::new(&light, camera, &settings);
     let half = 0.012;
     for &[u, v] in squares {
         let n = 24;

@@ -124,8 +124,7 @@ pub fn trace(light: &Illumination, camera: &Camera, settings: &TraceSettings, pr
         return Err(Error::parameter("rays", format!("{width}x{height} with {} sub-rays", settings.edge_rays)));
     }
     let begin = Instant::now();
-    let aspect = f64::from(width) / f64::from(height);
-    let eye = Eye { light, camera, settings, aspect };
+    let eye = Eye::new(light, camera, settings);
     progress.start("tracing rays", pixels);
     let seen: Vec<Seen> = (0..pixels as u32)
         .into_par_iter()
