@@ -210,7 +210,7 @@ pub fn compute(
 /// pass is planned for itself: fixed costs (tables, transforms) are paid `passes` times.
 ///
 /// # Errors
-/// Those of [`plan`] and [`compute`]; [`Error::Parameter`](crate::Error::Parameter) for no passes or more than eight.
+/// Those of [`plan`] and [`compute`]; [`Error::Parameter`] for no passes or more than eight.
 pub fn compute_progressively(
     points: &[PointSource],
     grid: &Grid,
@@ -268,7 +268,7 @@ impl Computed {
 /// Name of the graphics processor that [`Method::Gpu`] computes on.
 ///
 /// # Errors
-/// [`Error::Unsupported`](crate::Error::Unsupported) where there is none, or in a build without the feature `gpu`.
+/// [`Error::Unsupported`] where there is none, or in a build without the feature `gpu`.
 pub fn gpu_adapter() -> Result<&'static str> {
     #[cfg(feature = "gpu")]
     return gpu::adapter();
