@@ -15,7 +15,7 @@ use std::collections::HashMap;
 /// No element: a side that stores no light.
 pub(crate) const NONE: u32 = u32::MAX;
 /// Rays that measure how near the surroundings of a vertex are.
-const PROBE_SIDE: usize = 8;
+const PROBE_SIDE: usize = 6;
 /// By which part of the way to an element's middle its corners are drawn in before they look round: walls that meet
 /// the element at its border are then not in the way.
 const DRAWN_IN: f64 = 0.02;

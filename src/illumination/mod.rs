@@ -89,7 +89,7 @@ impl Default for IlluminationSettings {
         Self {
             form_factor: FormFactor::Lambert,
             residual: 1e-4,
-            indirect_rays: 484,
+            indirect_rays: 441,
             shadow_rays: 16,
             penumbra_rays: 64,
             longest_element: 1.0 / 16.0,

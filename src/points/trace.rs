@@ -55,7 +55,7 @@ impl Default for TraceSettings {
             width: 500,
             height: 500,
             bounces: 32,
-            edge_rays: 4,
+            edge_rays: 3,
             mirror_depth: MirrorDepth::Focus,
             jitter: false,
             seed: 1,
