@@ -4,8 +4,8 @@ use super::args::{ComputeArgs, ShowArgs};
 use super::commands::{content, encode_field, origin, report_field, seen_half};
 use super::light::report_gamut;
 use super::load::{Panel, Points, hologram_settings};
-use super::report::{Report, count, seconds};
-use super::show::{focus_step, planes_of};
+use super::report::Report;
+use super::show::{focus_step, planes_of, report_likeness, report_pictures};
 use glam::DVec2;
 use holodrive::field::npy::{self, CONVENTION, Content};
 use holodrive::hologram::HologramSettings;
@@ -200,8 +200,7 @@ pub(super) fn look(
             let seen = behind.picture(&view, half, size, progress)?;
             write(&out.join(format!("reconstruction-{name}.png")), &seen, seen.percentile(0.995), &view, half, colors)?;
         }
-        let elapsed = begin.elapsed().as_secs_f64();
-        report.add("reconstruction_seconds", elapsed, format!("pictures     {:>8}", seconds(elapsed)));
+        report_pictures(begin, report);
         return Ok(());
     };
     let size = (lit.view.width, lit.view.height);
@@ -234,19 +233,8 @@ pub(super) fn look(
         let seen = behind.picture(&view, half_at(*focus), size, progress)?;
         write(&path("eye"), &seen, seen.white_like(&target, white), &view, half_at(*focus), colors)?;
     }
-    let elapsed = begin.elapsed().as_secs_f64();
-    report.add_serialised(
-        "likeness",
-        &likeness,
-        format!(
-            "simulated reconstruction in colour, all in focus from {} planes, against the traced picture: PSNR {:.1} dB, SSIM {:.3}; on 5 × 5 blocks {:.1} dB",
-            count(planes),
-            likeness.psnr,
-            likeness.ssim,
-            likeness.psnr_blocks
-        ),
-    );
-    report.add("reconstruction_seconds", elapsed, format!("pictures     {:>8}", seconds(elapsed)));
+    report_likeness(&likeness, "reconstruction in colour", planes, report);
+    report_pictures(begin, report);
     Ok(())
 }
 

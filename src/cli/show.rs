@@ -199,8 +199,7 @@ fn look(
                 half,
             )?;
         }
-        let elapsed = begin.elapsed().as_secs_f64();
-        report.add("reconstruction_seconds", elapsed, format!("pictures     {:>8}", seconds(elapsed)));
+        report_pictures(begin, report);
         return Ok(());
     };
     let size = (lit.view.width, lit.view.height);
@@ -238,20 +237,30 @@ fn look(
         let scale = Scale::White((f64::from(white) / own.gain.max(f64::MIN_POSITIVE)) as f32);
         write_view(&out.join("reconstruction-eye.png"), &seen, scale, &view, half_at(*focus))?;
     }
-    let elapsed = begin.elapsed().as_secs_f64();
+    report_likeness(&likeness, "reconstruction", planes, report);
+    report_pictures(begin, report);
+    Ok(())
+}
+
+/// How like the traced picture `what` is that was put together from so many planes.
+pub(super) fn report_likeness(likeness: &metrics::Likeness, what: &str, planes: usize, report: &mut Report) {
     report.add_serialised(
         "likeness",
-        &likeness,
+        likeness,
         format!(
-            "simulated reconstruction, all in focus from {} planes, against the traced picture: PSNR {:.1} dB, SSIM {:.3}; on 5 × 5 blocks {:.1} dB",
+            "simulated {what}, all in focus from {} planes, against the traced picture: PSNR {:.1} dB, SSIM {:.3}; on 5 × 5 blocks {:.1} dB",
             count(planes),
             likeness.psnr,
             likeness.ssim,
             likeness.psnr_blocks
         ),
     );
+}
+
+/// What the pictures took.
+pub(super) fn report_pictures(begin: Instant, report: &mut Report) {
+    let elapsed = begin.elapsed().as_secs_f64();
     report.add("reconstruction_seconds", elapsed, format!("pictures     {:>8}", seconds(elapsed)));
-    Ok(())
 }
 
 /// Planes to look at when nothing but the depth range is known.

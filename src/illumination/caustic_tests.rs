@@ -1,6 +1,6 @@
 //! Light by way of mirrors and glass against closed forms.
 
-use super::rooms::Room;
+use super::rooms::{Room, glass};
 use super::*;
 use crate::random::Random;
 use crate::scene::bvh::Ray;
@@ -107,13 +107,7 @@ fn a_glass_ball_focuses_light_on_the_floor() {
     // a small lamp. The floor stands in the focus, so the centre is bright; what enters the ball within a small aperture
     // arrives with two Fresnel transmissions.
     let mut room = Room::default();
-    let glass = room.material(Material {
-        transmission: 1.0,
-        thickness: 1.0,
-        roughness: 0.0,
-        ior: 1.5,
-        ..Material::diffuse(Vec3::ONE)
-    });
+    let glass = room.material(glass());
     let white = room.material(Material::diffuse(Vec3::ONE));
     let lamp = room.material(Material::emitter(Vec3::splat(1e4)));
     let (radius, u, n) = (0.05, 3.0, 1.5);

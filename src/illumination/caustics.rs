@@ -6,6 +6,7 @@
 //! costs some hundred terms however many photons there are.
 
 use super::photons::Photon;
+use super::sampling::{GOLDEN, tangents};
 use crate::scene::bvh::{Ray, SceneBvh, Sides};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -184,7 +185,7 @@ impl Spot {
     /// Part of the kernel that lies on the surface: a wall, an edge or another body may cut it.
     fn part_on_surface(&self, bvh: &SceneBvh, radius: f64) -> f64 {
         let facing = self.facing.as_dvec3();
-        let (x, y) = super::sampling::tangents(facing);
+        let (x, y) = tangents(facing);
         let lift = facing * (THICKNESS * radius).max(2.0 * bvh.offset());
         let above = self.position + lift;
         let found = (0..PROBES)
@@ -192,7 +193,7 @@ impl Spot {
                 // Equal shares of the kernel: 1 − (1 − t)³ is its flux within r² = tR².
                 let share = (i as f64 + 0.5) / PROBES as f64;
                 let r = radius * (1.0 - (1.0 - share).cbrt()).sqrt();
-                let (sin, cos) = (TAU * (i as f64 * 0.618_033_988_749_894_9).fract()).sin_cos();
+                let (sin, cos) = (TAU * (i as f64 * GOLDEN).fract()).sin_cos();
                 let start = above + x * (r * cos) + y * (r * sin);
                 if bvh.occluded(above, start) {
                     return false;

@@ -307,7 +307,7 @@ impl Emitters {
             sum += tally.mean() * factor as f32;
         }
         let points = self.punctual.iter().map(|light| punctual(bvh, optics, light, point, normal)).sum();
-        (sum * self.form_factor.scale() as f32, points)
+        (sum * self.scale(), points)
     }
 
     /// The factor by which a transfer differs from Lambert's.

@@ -1,6 +1,7 @@
 //! Flat mirrors: the polygons in which lamps have sharp mirror images.
 
 use super::elements::NONE;
+use super::form_factor::clip;
 use super::surface::MIRROR_ALPHA;
 use crate::scene::{AlphaMode, Material, Scene};
 use glam::DVec3;
@@ -34,34 +35,11 @@ impl FlatMirror {
         point - self.normal * (2.0 * self.height(point))
     }
 
-    /// Mirror image of a direction.
-    pub(crate) fn turned(&self, direction: DVec3) -> DVec3 {
-        direction - self.normal * (2.0 * direction.dot(self.normal))
-    }
-
-    /// The part of a polygon in front of the mirror (Sutherland & Hodgman).
+    /// The part of a polygon in front of the mirror.
     pub(crate) fn in_front(&self, polygon: &[DVec3]) -> Vec<DVec3> {
         let mut kept = Vec::with_capacity(polygon.len() + 1);
         clip(polygon, |p| self.height(p), &mut kept);
         kept
-    }
-}
-
-/// The part of a convex polygon where a linear function is positive.
-pub(crate) fn clip(polygon: &[DVec3], height: impl Fn(DVec3) -> f64, kept: &mut Vec<DVec3>) {
-    kept.clear();
-    for (i, &p) in polygon.iter().enumerate() {
-        let q = polygon[(i + 1) % polygon.len()];
-        let (hp, hq) = (height(p), height(q));
-        if hp >= 0.0 {
-            kept.push(p);
-        }
-        if (hp < 0.0) != (hq < 0.0) {
-            kept.push(p.lerp(q, hp / (hp - hq)));
-        }
-    }
-    if kept.len() < 3 {
-        kept.clear();
     }
 }
 

@@ -36,19 +36,28 @@ pub fn point_to_polygon(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     if polygon.iter().all(|p| heights(p) >= 0.0) {
         return edge_sum(normal, polygon.iter().map(|p| *p - point));
     }
-    // Sutherland–Hodgman against the horizon.
     let mut above = Vec::with_capacity(polygon.len() + 1);
-    for (i, p) in polygon.iter().enumerate() {
-        let q = &polygon[(i + 1) % polygon.len()];
-        let (hp, hq) = (heights(p), heights(q));
+    clip(polygon, |p| heights(&p), &mut above);
+    edge_sum(normal, above.iter().map(|p| *p - point))
+}
+
+/// The part of a convex polygon where a linear function is not negative (Sutherland & Hodgman 1974); empty if that is no
+/// polygon any more.
+pub(crate) fn clip(polygon: &[DVec3], height: impl Fn(DVec3) -> f64, kept: &mut Vec<DVec3>) {
+    kept.clear();
+    for (i, &p) in polygon.iter().enumerate() {
+        let q = polygon[(i + 1) % polygon.len()];
+        let (hp, hq) = (height(p), height(q));
         if hp >= 0.0 {
-            above.push(*p - point);
+            kept.push(p);
         }
         if (hp < 0.0) != (hq < 0.0) {
-            above.push(p.lerp(*q, hp / (hp - hq)) - point);
+            kept.push(p.lerp(q, hp / (hp - hq)));
         }
     }
-    edge_sum(normal, above.iter().copied())
+    if kept.len() < 3 {
+        kept.clear();
+    }
 }
 
 fn edge_sum(normal: DVec3, spokes: impl Iterator<Item = DVec3> + Clone) -> f64 {

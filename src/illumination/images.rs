@@ -6,9 +6,10 @@
 //! only what stands in the way. Curved mirrors, glass and rough metal are left to photons (`photons`).
 
 use super::emitters::{Emitters, MOST_REDRAWS, ShadowRays, punctual_light};
-use super::flat_mirrors::{FlatMirror, clip, polygon_area};
-use super::form_factor::{point_to_element, point_to_polygon};
+use super::flat_mirrors::{FlatMirror, polygon_area};
+use super::form_factor::{clip, point_to_element, point_to_polygon};
 use super::paths::{Optics, reflected};
+use super::sampling::GOLDEN;
 use super::surface::Surface;
 use crate::random::Random;
 use crate::scene::PunctualLight;
@@ -23,8 +24,6 @@ const MOST_CANDIDATES: usize = 1024;
 const LEAST_SHARE: f64 = 3e-4;
 /// One that adds less than this everywhere is computed at the vertices of the mesh, not at each point.
 const STRONG_SHARE: f64 = 0.03;
-/// Golden section: strides of this leave no gaps in a unit interval.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// What a ray meets when it follows light through mirrors.
 #[derive(Clone, Copy)]
@@ -206,7 +205,7 @@ impl Image {
             Source::Point(light) => {
                 let mut light = light.clone();
                 light.position = mirror.image(light.position.as_dvec3()).as_vec3();
-                light.direction = mirror.turned(light.direction.as_dvec3()).as_vec3();
+                light.direction = reflected(light.direction.as_dvec3(), mirror.normal).as_vec3();
                 Source::Point(light)
             }
         };
@@ -219,7 +218,7 @@ impl Image {
         Some(Self {
             source,
             polygon: polygon.into_iter().map(|p| mirror.image(p)).collect(),
-            normal: mirror.turned(self.normal),
+            normal: reflected(self.normal, mirror.normal),
             windows: unfolded,
             front: Some((mirror.outline[0], mirror.normal)),
             reflectance,

@@ -328,6 +328,8 @@ impl IlluminationSettings {
         within("shadow-rays", f64::from(self.shadow_rays), 1.0, 1e6)?;
         within("penumbra-rays", f64::from(self.penumbra_rays), 0.0, 1e6)?;
         within("indirect-rays", f64::from(self.indirect_rays), 16.0, 1e6)?;
+        // Their table takes some 100 bytes each.
+        within("photons", f64::from(self.photons), 0.0, 2e7)?;
         within("bounces", f64::from(self.bounces), 0.0, 1000.0)?;
         if let Some(rays) = self.final_gather {
             within("final-gather", f64::from(rays), 1.0, 1e6)?;

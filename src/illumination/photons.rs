@@ -179,7 +179,12 @@ impl Lamp<'_> {
                 let squared = span.length_squared();
                 let solid = leaving.abs() * target.normal.dot(span).abs() / (squared * squared);
                 let lift = e.normal() * bvh.offset().copysign(leaving);
-                (from + lift, e.radiance(scene, weights, from) * (solid * e.area() * target.area) as f32)
+                (
+                    from + lift,
+                    e.radiance(scene, weights, from)
+                        * (solid * e.area() * target.area) as f32
+                        * around.emitters.scale(),
+                )
             }
             Self::Point(light) => {
                 let towards = |normal| punctual_light(bvh, light, at, normal);

@@ -3,6 +3,11 @@
 use crate::scene::{Material, Scene, Triangle};
 use glam::{DVec3, Vec2, Vec3};
 
+/// Clear glass of index 1.5 that fills the body it bounds.
+pub(crate) fn glass() -> Material {
+    Material { transmission: 1.0, thickness: 1.0, roughness: 0.0, ior: 1.5, ..Material::diffuse(Vec3::ONE) }
+}
+
 /// A scene that is put together by hand.
 #[derive(Default)]
 pub(crate) struct Room {

@@ -4,6 +4,9 @@ use crate::random::Random;
 use glam::DVec3;
 use std::f64::consts::TAU;
 
+/// Golden section: strides of this leave no gaps in a unit interval.
+pub(crate) const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
 /// Two unit vectors that make a right-handed frame with `normal` (Duff et al. 2017, without branches at the poles).
 pub(crate) fn tangents(normal: DVec3) -> (DVec3, DVec3) {
     let sign = 1.0f64.copysign(normal.z);

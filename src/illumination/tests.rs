@@ -277,6 +277,7 @@ fn settings_outside_their_domain_are_refused() {
     let good = IlluminationSettings::default();
     assert!(refused(IlluminationSettings { residual: f64::NAN, ..good }));
     assert!(refused(IlluminationSettings { shadow_rays: 0, ..good }));
+    assert!(refused(IlluminationSettings { photons: u32::MAX, ..good }));
     assert!(refused(IlluminationSettings { shortest_element: 0.5, ..good }));
     assert!(!refused(good), "an empty scene is dark, not wrong");
 }

@@ -3,7 +3,7 @@
 use super::eye::Eye;
 use super::trace::{MirrorDepth, TraceSettings, trace};
 use crate::illumination::oracle::Oracle;
-use crate::illumination::rooms::Room;
+use crate::illumination::rooms::{Room, glass};
 use crate::illumination::{Illumination, IlluminationSettings};
 use crate::progress::Progress;
 use crate::random::Random;
@@ -84,13 +84,7 @@ fn a_mirror_ball_a_glass_ball_and_a_block_agree_with_plain_paths() {
     let matte = Material::diffuse(Vec3::splat(0.7));
     let mut room = white_box(matte.clone(), matte);
     let silver = room.material(Material::mirror(Vec3::splat(0.9)));
-    let glass = room.material(Material {
-        transmission: 1.0,
-        thickness: 1.0,
-        roughness: 0.0,
-        ior: 1.5,
-        ..Material::diffuse(Vec3::ONE)
-    });
+    let glass = room.material(glass());
     let rough = room.material(Material { roughness: 0.3, ..Material::mirror(Vec3::splat(0.8)) });
     room.sphere(DVec3::new(-0.25, -0.3, -0.2), 0.15, false, 32, silver);
     room.sphere(DVec3::new(0.25, -0.3, -0.1), 0.15, false, 32, glass);
@@ -148,13 +142,7 @@ fn a_mirror_ball_shows_things_where_its_focus_says() {
 #[test]
 fn a_glass_plate_lifts_what_lies_behind_it() {
     let mut room = Room::default();
-    let glass = room.material(Material {
-        transmission: 1.0,
-        thickness: 1.0,
-        roughness: 0.0,
-        ior: 1.5,
-        ..Material::diffuse(Vec3::ONE)
-    });
+    let glass = room.material(glass());
     let glow = room.material(Material::emitter(Vec3::ONE));
     let thickness = 0.3;
     room.cuboid(DVec3::new(-1.0, -1.0, -0.8), DVec3::new(1.0, 1.0, -0.8 + thickness), false, [glass; 6]);

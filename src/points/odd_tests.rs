@@ -2,7 +2,7 @@
 
 use super::eye_tests::{agrees, white_box};
 use super::trace::{TraceSettings, Traced, trace};
-use crate::illumination::rooms::Room;
+use crate::illumination::rooms::{Room, glass};
 use crate::illumination::{Illumination, IlluminationSettings};
 use crate::progress::Progress;
 use crate::scene::{Camera, Material, Scene, SceneBvh};
@@ -20,10 +20,6 @@ fn traced(scene: &Scene, camera: &Camera) -> Traced {
 
 fn matte() -> Material {
     Material::diffuse(Vec3::splat(0.7))
-}
-
-fn glass() -> Material {
-    Material { transmission: 1.0, thickness: 1.0, roughness: 0.0, ior: 1.5, ..Material::diffuse(Vec3::ONE) }
 }
 
 #[test]
