@@ -2,10 +2,12 @@
 
 pub mod fft;
 pub mod grid;
+mod memory;
 pub mod npy;
 
 pub use fft::Fft2;
 pub use grid::Grid;
+pub use memory::zeroed;
 pub use num_complex::{Complex, Complex32, Complex64};
 
 use crate::error::{Error, Result};
@@ -27,7 +29,7 @@ pub struct Field<T = f32> {
 impl<T: bytemuck::Zeroable> Field<T> {
     /// The dark field; its memory is taken page by page when it is first written.
     pub fn zeros(grid: Grid, wavelength: f64) -> Self {
-        Self { grid, wavelength, samples: bytemuck::zeroed_vec(grid.len()) }
+        Self { grid, wavelength, samples: zeroed(grid.len()) }
     }
 }
 

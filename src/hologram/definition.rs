@@ -189,10 +189,8 @@ impl Weideman {
         };
         // The function is even, and zero at θ = π.
         let terms = std::array::from_fn(|n| {
-            let sum: f64 = (1..samples / 2)
-                .map(sampled)
-                .map(|(theta, value)| 2.0 * value * ((n + 1) as f64 * theta).cos())
-                .sum();
+            let sum: f64 =
+                (1..samples / 2).map(sampled).map(|(theta, value)| 2.0 * value * ((n + 1) as f64 * theta).cos()).sum();
             (sum + scale * scale) / samples as f64
         });
         Self { scale, terms }

@@ -184,8 +184,7 @@ pub fn compute(
         Engine::Planes(parameters) => {
             let cloud = planes::Cloud::new(&optics, grid, &sources);
             progress.check()?;
-            let mut field = Field::zeros(*grid, wavelength);
-            planes::add(&mut field, &optics, &cloud, &parameters, set, progress)?;
+            let field = planes::field(grid, &optics, &cloud, &parameters, set, progress)?;
             (field, parameters.error(&optics, &cloud))
         }
     };

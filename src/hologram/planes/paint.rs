@@ -14,8 +14,17 @@ use rayon::prelude::*;
 /// Points painted together: a patch's row is loaded and stored once for all of them.
 const GROUP: usize = 3;
 
-/// Side of a bin [px].
-pub(super) const BIN: usize = 64;
+/// Cells of dabs that are painted one after another [px].
+const CELL: usize = 16;
+
+/// Side of a bin for kernels of the given half sizes [px]: a patch is the bin and the kernels' reach around it, and what
+/// of it is reach is painted, cleared and added more than once. Larger bins have less of that, as long as the patch
+/// stays in the second-level cache, or does not in either size.
+pub(super) fn bin(half: [usize; 2], rank: usize) -> usize {
+    const CACHE: usize = 768 << 10;
+    let patch = |bin: usize| half.iter().map(|half| bin + 2 * half).product::<usize>() * 8 * rank;
+    if patch(128) > CACHE && patch(64) <= CACHE { 64 } else { 128 }
+}
 
 /// Most dabs of one patch: a crowded bin is shared among threads, and f32 sums of more terms lose digits.
 const LARGEST: usize = 4096;
@@ -50,6 +59,8 @@ pub(super) struct Brush<'a> {
     pub(super) rank: usize,
     /// Largest |d|, h [m].
     pub(super) depth: f64,
+    /// Side of a bin [px], a multiple of [`CELL`].
+    pub(super) bin: usize,
 }
 
 /// The moments of one plane, rows of `width` samples each.
@@ -73,7 +84,8 @@ pub(super) const ORDER_BYTES: usize = size_of::<(u64, u32, u32)>() + size_of::<u
 
 /// Memory of one wave of patches, for kernels of the given half sizes [px], and of the threads that paint [bytes].
 pub(super) fn bytes(half: [usize; 2], rank: usize) -> u64 {
-    let [width, height] = half.map(|half| 2 * half + BIN + 20);
+    let bin = bin(half, rank);
+    let [width, height] = half.map(|half| 2 * half + bin + 20);
     let lines = 4 * (GROUP * 2 * (width + 32) + 2 * (GROUP + 1) * (height + 32));
     (WAVE * (width + 16) * height * 8 * rank + rayon::current_num_threads() * lines) as u64
 }
@@ -86,7 +98,7 @@ pub(super) fn paint(
     set: InstructionSet,
     progress: &Progress,
 ) -> Result<()> {
-    let bins = bins(dabs, canvas.width);
+    let bins = bins(dabs, canvas.width, brush.bin);
     let mut patches: Vec<Patch> = Vec::new();
     patches.resize_with(WAVE.min(bins.len()), Patch::default);
     for wave in bins.chunks(WAVE) {
@@ -100,8 +112,12 @@ pub(super) fn paint(
         for (r, plane) in canvas.moments.iter_mut().enumerate() {
             let width = canvas.width;
             plane.par_chunks_mut(width * BAND).enumerate().for_each(|(band, rows)| {
+                let first = band * BAND;
                 for patch in patches {
-                    add_patch(patch, r, band * BAND, width, rows);
+                    // SAFETY: the set was detected on this machine.
+                    unsafe {
+                        dispatch!(set, add_patch(patch: &Patch, r: usize, first: usize, width: usize, rows: &mut [Complex32]));
+                    }
                 }
             });
         }
@@ -112,22 +128,24 @@ pub(super) fn paint(
 
 /// Indexes of the dabs of each bin that has any, bins in row-major order, within a bin near ones beside each other; a
 /// crowded bin comes in several parts.
-fn bins(dabs: &[Dab], width: usize) -> Vec<Vec<u32>> {
-    let across = width.div_ceil(BIN) as u64;
+fn bins(dabs: &[Dab], width: usize, bin: usize) -> Vec<Vec<u32>> {
+    let across = width.div_ceil(bin) as u64;
+    let side = bin as u64;
+    let cells = side / CELL as u64;
     let key = |dab: &Dab| {
         let [x, y] = dab.at.map(|p| p as u64);
-        let bin = (y / BIN as u64) * across + x / BIN as u64;
-        // 16-pixel cells in boustrophedon order: a group's kernels are of similar size and place, so little of their
-        // union is wasted.
-        let (cx, cy) = (x % BIN as u64 / 16, y % BIN as u64 / 16);
-        bin * 16 + cy * 4 + if cy % 2 == 0 { cx } else { 3 - cx }
+        let bin = (y / side) * across + x / side;
+        // Cells in boustrophedon order: a group's kernels are of similar size and place, so little of their union is
+        // wasted.
+        let (cx, cy) = (x % side / CELL as u64, y % side / CELL as u64);
+        (bin * cells + cy) * cells + if cy % 2 == 0 { cx } else { cells - 1 - cx }
     };
     // Positive floats are in the order of their bits; equal ones keep their order by the index.
     let entry = |(i, dab): (usize, &Dab)| (key(dab), (dab.d.abs() as f32).to_bits(), i as u32);
     let mut order: Vec<(u64, u32, u32)> = dabs.par_iter().enumerate().map(entry).collect();
     order.par_sort_unstable();
     order
-        .chunk_by(|a, b| a.0 / 16 == b.0 / 16)
+        .chunk_by(|a, b| a.0 / (cells * cells) == b.0 / (cells * cells))
         .flat_map(|bin| bin.chunks(LARGEST))
         .map(|bin| bin.iter().map(|entry| entry.2).collect())
         .collect()
@@ -314,7 +332,11 @@ unsafe fn strip<L: Lanes, const V: usize>(
 }
 
 /// Adds moment `r` of a patch to the rows of a plane that begin at `first`.
-fn add_patch(patch: &Patch, r: usize, first: usize, width: usize, rows: &mut [Complex32]) {
+///
+/// # Safety
+/// The instruction set of `L` must be enabled.
+#[inline(always)]
+unsafe fn add_patch<L: Lanes>(patch: &Patch, r: usize, first: usize, width: usize, rows: &mut [Complex32]) {
     let count = rows.len() / width;
     let low = first.max(patch.first[1]);
     let high = (first + count).min(patch.first[1] + patch.height);
@@ -322,10 +344,21 @@ fn add_patch(patch: &Patch, r: usize, first: usize, width: usize, rows: &mut [Co
     for row in low..high {
         let from = (r * patch.height + row - patch.first[1]) * patch.width;
         let to = (row - first) * width + patch.first[0];
-        let parts = patch.re.values()[from..from + columns].iter().zip(&patch.im.values()[from..from + columns]);
-        for (u, (re, im)) in rows[to..to + columns].iter_mut().zip(parts) {
-            u.re += re;
-            u.im += im;
+        let (re, im) = (&patch.re.values()[from..from + columns], &patch.im.values()[from..from + columns]);
+        let line = &mut rows[to..to + columns];
+        let whole = columns / L::COUNT * L::COUNT;
+        for i in (0..whole).step_by(L::COUNT) {
+            // SAFETY: i + COUNT ≤ columns, the length of all three.
+            unsafe {
+                let u = line.as_mut_ptr().add(i).cast::<f32>();
+                let (ur, ui) = L::load_complex(u);
+                let (re, im) = (L::load(re.as_ptr().add(i)), L::load(im.as_ptr().add(i)));
+                L::store_complex(ur.add(re), ui.add(im), u);
+            }
+        }
+        for i in whole..columns {
+            line[i].re += re[i];
+            line[i].im += im[i];
         }
     }
 }

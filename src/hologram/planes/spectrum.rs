@@ -3,16 +3,17 @@
 //! The transform of plane k, moment r, is multiplied by
 //!
 //! ```text
-//! exp(i2π ζ_k f_z) · (i2πh·c)^r/r! · √((1 − a)(1 − b)/(1 − a − b)),   a = λ²f_x², b = λ²f_y²
+//! exp(i2π ζ_k f_z) · i^r p_r(2πh·c) · √((1 − a)(1 − b)/(1 − a − b)),   a = λ²f_x², b = λ²f_y²
 //! c = f_z − separable fit of f_z
 //! ```
 //!
-//! summed over k and r, and transformed back. ζ_k f_z is split as ζ_k S(f_x) + ζ_k (S(f_y) − 1/λ) + ζ_k/λ·C: the first
+//! summed over k and r, and transformed back. p_r gathers the powers u^r of the Legendre series
+//! e^{ixu} = Σ (2l + 1) i^l j_l(x) P_l(u) up to l = R − 1, u = d/h: the least error over a slab with even depths. ζ_k f_z is split as ζ_k S(f_x) + ζ_k (S(f_y) − 1/λ) + ζ_k/λ·C: the first
 //! two are reduced modulo one turn in f64, and C, written without cancellation, is small enough for f32.
 
 use super::table::mean_square;
 use crate::error::Result;
-use crate::field::{Complex32, Field};
+use crate::field::{Complex32, Field, Grid, zeroed};
 use crate::hologram::definition::Optics;
 use crate::hologram::lanes::{Aligned, InstructionSet, Lanes, cos_sin, dispatch};
 use crate::progress::Progress;
@@ -73,6 +74,8 @@ pub(super) struct Spectrum {
     rows: [Arc<dyn Fft<f32>>; 2],
     columns: [Arc<dyn Fft<f32>>; 2],
     sum: Vec<Complex32>,
+    /// Whether no plane was added yet.
+    dark: bool,
 }
 
 impl Spectrum {
@@ -104,8 +107,8 @@ impl Spectrum {
             kappa: TAU * depth / lambda,
             set,
         };
-        let sum = bytemuck::zeroed_vec(width * (height + GAP));
-        Self { layout: *layout, shared, wavelength: lambda, rows, columns, sum }
+        let sum = zeroed(width * (height + GAP));
+        Self { layout: *layout, shared, wavelength: lambda, rows, columns, sum, dark: true }
     }
 
     /// Memory of the spectrum and of the threads that work on it [bytes].
@@ -141,11 +144,12 @@ impl Spectrum {
         }
         let carrier = Carrier { ratio, rows };
         let (layout, shared, plan, moments) = (&self.layout, &self.shared, &self.columns[0], &*moments);
+        let dark = std::mem::replace(&mut self.dark, false);
         self.sum.par_chunks_mut((height + GAP) * STRIP).enumerate().for_each_init(
             || Strip::new(layout, moments.len(), plan),
             |strip, (index, sum)| {
                 if !progress.stopped() {
-                    strip.add(index * STRIP, layout, moments, &carrier, shared, plan, sum);
+                    strip.add(index * STRIP, layout, moments, &carrier, shared, plan, sum, dark);
                     progress.advance(STRIP as u64);
                 }
             },
@@ -153,8 +157,8 @@ impl Spectrum {
         progress.check()
     }
 
-    /// Transforms back and adds the panel's window to the field.
-    pub(super) fn finish(mut self, field: &mut Field, progress: &Progress) -> Result<()> {
+    /// Transforms back: the field in the panel's window.
+    pub(super) fn finish(mut self, grid: &Grid, progress: &Progress) -> Result<Field> {
         let [width, height] = self.layout.size;
         let stride = height + GAP;
         let plan = &self.columns[1];
@@ -172,7 +176,7 @@ impl Spectrum {
         );
         progress.check()?;
         let (layout, sum, plan) = (&self.layout, &self.sum, &self.rows[1]);
-        let grid = field.grid;
+        let mut field = Field::zeros(*grid, self.wavelength);
         field.samples.par_chunks_mut(grid.width * STRIP).enumerate().for_each_init(
             || (vec![Complex32::default(); STRIP * width], vec![Complex32::default(); plan.get_inplace_scratch_len()]),
             |(lines, scratch), (block, samples)| {
@@ -189,12 +193,13 @@ impl Spectrum {
                 for (line, row) in lines.chunks_exact_mut(width).zip(samples.chunks_exact_mut(grid.width)) {
                     plan.process_with_scratch(line, scratch);
                     for (column, u) in row.iter_mut().enumerate() {
-                        *u += line[wrap(column, layout.origin[0], width)];
+                        *u = line[wrap(column, layout.origin[0], width)];
                     }
                 }
             },
         );
-        progress.check()
+        progress.check()?;
+        Ok(field)
     }
 }
 
@@ -242,6 +247,7 @@ impl Strip {
         shared: &Shared,
         plan: &Arc<dyn Fft<f32>>,
         sum: &mut [Complex32],
+        dark: bool,
     ) {
         let [width, height] = layout.size;
         let stride = height + GAP;
@@ -276,7 +282,7 @@ impl Strip {
             let (residual, amplitude) = (self.residual.values(), self.amplitude.values());
             // SAFETY: as above.
             unsafe {
-                dispatch!(shared.set, accumulate(shared: &Shared, carrier: &Carrier, base: f32, a: f64, residual: &[f32], amplitude: &[f32], moments: &[&[Complex32]], sum: &mut [Complex32]));
+                dispatch!(shared.set, accumulate(shared: &Shared, carrier: &Carrier, base: f32, a: f64, residual: &[f32], amplitude: &[f32], moments: &[&[Complex32]], sum: &mut [Complex32], dark: bool));
             }
         }
     }
@@ -312,7 +318,41 @@ unsafe fn prepare<L: Lanes>(shared: &Shared, a: f64, limit: f32, residual: &mut 
     }
 }
 
-/// Adds the moments of one plane, one column, to the sum.
+/// p_r(x) of the Legendre series up to P₃, r < `rank`, by the power series of the spherical Bessel functions j_l to 1e-6
+/// for |x| ≤ 1 (x stays below the fourth root of the rank's error).
+///
+/// # Safety
+/// The instruction set of `L` must be enabled.
+#[inline(always)]
+unsafe fn legendre<L: Lanes>(x: L, rank: usize) -> [L; 4] {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let w = x.mul(x);
+        let series =
+            |terms: [f32; 4]| terms[..3].iter().rev().fold(L::splat(terms[3]), |sum, &term| sum.fma(w, L::splat(term)));
+        let zero = L::splat(0.0);
+        // Under the name of j_l: (2l + 1)·j_l(x).
+        let j0 = series([1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0]);
+        if rank == 1 {
+            return [j0, zero, zero, zero];
+        }
+        let j1 = series([1.0, -1.0 / 10.0, 1.0 / 280.0, -1.0 / 15_120.0]).mul(x);
+        if rank == 2 {
+            return [j0, j1, zero, zero];
+        }
+        let j2 = series([1.0 / 3.0, -1.0 / 42.0, 1.0 / 1512.0, -1.0 / 99_792.0]).mul(w);
+        // −P₂ = ½ − (3/2)u².
+        let (p0, p2) = (j2.fma(L::splat(0.5), j0), j2.mul(L::splat(1.5)));
+        if rank == 3 {
+            return [p0, j1, p2, zero];
+        }
+        let j3 = series([1.0 / 15.0, -1.0 / 270.0, 1.0 / 11_880.0, -1.0 / 926_640.0]).mul(w).mul(x);
+        // −P₃ = (3/2)u − (5/2)u³.
+        [p0, j3.fma(L::splat(1.5), j1), p2, j3.mul(L::splat(2.5))]
+    }
+}
+
+/// Adds the moments of one plane, one column, to the sum, or begins the sum with them where it is dark.
 ///
 /// # Safety
 /// The instruction set of `L` must be enabled.
@@ -327,6 +367,7 @@ unsafe fn accumulate<L: Lanes>(
     amplitude: &[f32],
     moments: &[&[Complex32]],
     sum: &mut [Complex32],
+    dark: bool,
 ) {
     let count = sum.len();
     let (squares, rows) = (shared.squares.values(), carrier.rows.values());
@@ -350,15 +391,16 @@ unsafe fn accumulate<L: Lanes>(
             let (mut hr, mut hi) = (cos.mul(gain), sin.mul(gain));
             let x = L::load(squares.as_ptr().add(k)).fma(slope, constant).add(c).mul(scale);
             let to = sum.as_mut_ptr().cast::<f32>().add(2 * k);
-            let (mut re, mut im) = L::load_complex(to);
-            for (r, moment) in moments.iter().enumerate() {
-                if r > 0 {
-                    let step = x.mul(L::splat(1.0 / r as f32));
-                    (hr, hi) = (L::splat(0.0).sub(hi.mul(step)), hr.mul(step));
-                }
+            // Fresh memory is not read: see [`zeroed`].
+            let (mut re, mut im) = if dark { (L::splat(0.0), L::splat(0.0)) } else { L::load_complex(to) };
+            let weights = legendre::<L>(x, moments.len());
+            for (moment, weight) in moments.iter().zip(weights) {
                 let (ur, ui) = L::load_complex(moment.as_ptr().cast::<f32>().add(2 * k));
-                re = hi.fnma(ui, hr.fma(ur, re));
-                im = hi.fma(ur, hr.fma(ui, im));
+                let (gr, gi) = (hr.mul(weight), hi.mul(weight));
+                re = gi.fnma(ui, gr.fma(ur, re));
+                im = gi.fma(ur, gr.fma(ui, im));
+                // The next moment's factor is a quarter turn on: i^r.
+                (hr, hi) = (L::splat(0.0).sub(hi), hr);
             }
             L::store_complex(re, im, to);
             k += L::COUNT;
