@@ -146,14 +146,15 @@ impl Job<'_> {
         }
         let cloud = Cloud::new(&self.optics, self.grid, self.sources);
         let (error, memory) = (self.settings.error, self.memory);
-        let (parameters, cost) = Parameters::choose(&self.optics, self.grid, &cloud, error, memory)?;
+        let chosen = Parameters::choose(&self.optics, self.grid, &cloud, error, memory)?;
+        let Parameters { planes, rank, .. } = chosen.parameters;
         Some(Candidate {
             method: Method::Planes,
-            engine: Engine::Planes(parameters),
-            core_seconds: cost * set_factor(self.settings, Method::Planes),
-            error: parameters.error(&self.optics, &cloud),
-            memory: parameters.bytes(&self.optics, self.grid, &cloud),
-            words: format!("{} planes, rank {}", parameters.planes, parameters.rank),
+            engine: Engine::Planes(chosen.parameters),
+            core_seconds: chosen.core_seconds * set_factor(self.settings, Method::Planes),
+            error: chosen.error,
+            memory: chosen.bytes,
+            words: format!("{planes} planes, rank {rank}"),
         })
     }
 

@@ -1,6 +1,6 @@
 //! Spectral wavefront recording planes: the cost of a point no longer grows with its distance from the panel.
 //!
-//! 1. K planes are laid *inside* the cloud. Each point is painted on its nearest plane with its exact band-limited
+//! 1. K planes are laid *inside* the cloud, where it has points ([`slabs`]). Each point is painted on its nearest plane with its exact band-limited
 //!    wave, which there is small: the product of two one-dimensional kernels from a table ([`table`], [`paint`]).
 //! 2. The planes are carried to the panel one after another by the exact angular spectrum ([`spectrum`]): whatever their
 //!    number, memory is that of one plane and of the sum.
@@ -12,6 +12,7 @@
 //! kernels' cut tails, and the table's interpolation; [`Parameters::error`].
 
 mod paint;
+mod slabs;
 mod spectrum;
 mod table;
 
@@ -23,6 +24,7 @@ use crate::field::{Complex32, Field, Grid, zeroed};
 use crate::progress::Progress;
 use paint::{Brush, Canvas, Dab, paint};
 use rayon::prelude::*;
+use slabs::{Depths, Slabs};
 use spectrum::{Layout, Spectrum};
 use table::{Fineness, Table, mean_square};
 
@@ -39,13 +41,25 @@ pub(crate) struct Parameters {
     pub(crate) table: Fineness,
 }
 
+/// Parameters that keep an error, and what they take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Chosen {
+    pub(crate) parameters: Parameters,
+    /// Predicted relative L2 error of the field.
+    pub(crate) error: f64,
+    /// Predicted work on the widest instruction set [core-seconds].
+    pub(crate) core_seconds: f64,
+    /// Memory beside points and field [bytes].
+    pub(crate) bytes: u64,
+}
+
 /// What planes need to know of the sources together, gathered in one pass.
 #[derive(Clone, Debug)]
 pub(crate) struct Cloud {
     /// The sources whose light meets the panel.
     sources: Vec<Source>,
-    /// Smallest and largest signed distance ζ = −z: light runs from −ζ to the panel at 0 [m].
-    depths: [f64; 2],
+    /// Light by signed distance ζ = −z: it runs from −ζ to the panel at 0 [m].
+    depths: Depths,
     /// Lowest and highest panel column, and row.
     places: [[f64; 2]; 2],
     /// Period that keeps aliases off the panel, without the tail [px].
@@ -66,12 +80,10 @@ impl Cloud {
         };
         let sources: Vec<Source> = sources.par_iter().filter(|s| meets(s)).copied().collect();
         let none = [f64::INFINITY, f64::NEG_INFINITY];
-        let (mut depths, mut places) = (none, [none; 2]);
+        let mut places = [none; 2];
         let pixels = [grid.width as f64, grid.height as f64];
         let mut period = pixels;
         for s in &sources {
-            let depth = s.sign * s.distance;
-            depths = [depths[0].min(depth), depths[1].max(depth)];
             for (axis, at) in [grid.column(s.x), grid.row(s.y)].into_iter().enumerate() {
                 places[axis] = [places[axis][0].min(at), places[axis][1].max(at)];
                 // An alias, one period away, must lie beyond the point's reach from the farthest pixel.
@@ -81,61 +93,77 @@ impl Cloud {
         }
         let limit = optics.taper.map(|taper| optics.wavelength * taper.limit);
         let steepness = (tilt(&sources, grid, limit) / (limit[0] * limit[1] / 3.0)).max(1.0);
+        let depths = Depths::new(sources.iter().map(|s| (s.sign * s.distance, s.amplitude)));
         Self { sources, depths, places, period, steepness }
     }
 }
 
 impl Parameters {
-    /// Half depth of a slab, h [m].
-    fn half_depth(&self, optics: &Optics, cloud: &Cloud) -> f64 {
-        (0.5 * (cloud.depths[1] - cloud.depths[0]) / self.planes as f64).max(optics.wavelength)
+    /// Where the planes stand.
+    fn slabs(&self, optics: &Optics, cloud: &Cloud) -> Slabs {
+        cloud.depths.slabs(self.planes, optics.wavelength)
     }
-    /// Predicted relative L2 error of the field; its parts are independent, so their squares add up.
+    /// Predicted relative L2 error of the field.
     pub(crate) fn error(&self, optics: &Optics, cloud: &Cloud) -> f64 {
+        let slabs = self.slabs(optics, cloud);
+        self.error_with(optics, cloud, &slabs, cloud.depths.unevenness(&slabs, self.rank))
+    }
+    /// Its parts are independent, so their squares add up.
+    fn error_with(&self, optics: &Optics, cloud: &Cloud, slabs: &Slabs, unevenness: f64) -> f64 {
         if cloud.sources.is_empty() {
             return 0.0;
         }
         let sine = optics.taper.map(|taper| (optics.wavelength * taper.limit).powi(2));
-        let h = self.half_depth(optics, cloud);
+        let h = slabs.half;
         let first = 0.035 * cloud.steepness * h / optics.wavelength * sine[0] * sine[1];
-        let rank = first.powi(self.rank as i32) * [1.0, 0.57, 0.18, 0.046][self.rank.min(4) - 1];
+        let rank = first.powi(self.rank as i32) * [1.0, 0.57, 0.18, 0.046][self.rank.min(4) - 1] * unevenness;
         let narrow = (0..2).map(|axis| optics.cone(axis, h) / optics.pitch[axis]).fold(f64::INFINITY, f64::min);
         let parts = [rank, tail_error(self.tail, narrow), self.table.error()];
-        MARGIN * parts.iter().map(|part| part * part).sum::<f64>().sqrt()
+        margin(cloud.steepness) * parts.iter().map(|part| part * part).sum::<f64>().sqrt()
     }
-    /// The cheapest for a wanted error within a memory budget [bytes], with its cost in core-seconds, or the smallest
-    /// where none fits; `None` where up to four moments do not reach the error.
-    pub(crate) fn choose(optics: &Optics, grid: &Grid, cloud: &Cloud, error: f64, memory: u64) -> Option<(Self, f64)> {
+    /// The cheapest for a wanted error within a memory budget [bytes], or the smallest where none fits; `None` where up to
+    /// four moments do not reach the error.
+    pub(crate) fn choose(optics: &Optics, grid: &Grid, cloud: &Cloud, error: f64, memory: u64) -> Option<Chosen> {
         let table = if error < 5e-4 { Fineness::Fine } else { Fineness::Coarse };
-        let mut best: Option<(Self, f64, u64)> = None;
-        for rank in 1..=4 {
-            for planes in [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32] {
-                let Some(parameters) = (8..36)
+        let mut best: Option<Chosen> = None;
+        let mut most = 0;
+        for count in [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32] {
+            let slabs = cloud.depths.slabs(count, optics.wavelength);
+            // Layers, or one depth, need no more planes than there are.
+            let planes = slabs.depths.len().max(1);
+            if std::mem::replace(&mut most, planes) == planes {
+                break;
+            }
+            for rank in 1..=4 {
+                let unevenness = cloud.depths.unevenness(&slabs, rank);
+                let good = (8..36)
                     .map(|tail| Self { planes, rank, tail: f64::from(tail), table })
-                    .find(|parameters| parameters.error(optics, cloud) <= error)
-                else {
-                    continue;
+                    .map(|parameters| (parameters, parameters.error_with(optics, cloud, &slabs, unevenness)))
+                    .find(|(_, found)| *found <= error);
+                let Some((parameters, found)) = good else { continue };
+                let core_seconds = parameters.core_seconds(optics, grid, cloud, &slabs);
+                let bytes = parameters.bytes(optics, grid, cloud, &slabs);
+                let better = |best: &Chosen| {
+                    if best.bytes > memory {
+                        bytes < best.bytes
+                    } else {
+                        bytes <= memory && core_seconds < best.core_seconds
+                    }
                 };
-                let cost = parameters.core_seconds(optics, grid, cloud);
-                let bytes = parameters.bytes(optics, grid, cloud);
-                let better = |(_, least, size): (Self, f64, u64)| {
-                    if size > memory { bytes < size } else { bytes <= memory && cost < least }
-                };
-                if best.is_none_or(better) {
-                    best = Some((parameters, cost, bytes));
+                if best.as_ref().is_none_or(better) {
+                    best = Some(Chosen { parameters, error: found, core_seconds, bytes });
                 }
             }
         }
-        best.map(|(parameters, cost, _)| (parameters, cost))
+        best
     }
-    /// Predicted work [core-seconds] on the widest instruction set.
-    pub(crate) fn core_seconds(&self, optics: &Optics, grid: &Grid, cloud: &Cloud) -> f64 {
+    fn core_seconds(&self, optics: &Optics, grid: &Grid, cloud: &Cloud, slabs: &Slabs) -> f64 {
         if cloud.sources.is_empty() {
             return 0.0;
         }
-        let layout = layout(optics, grid, cloud, self);
+        let layout = layout(optics, grid, cloud, self, slabs);
         let pixels = (layout.size[0] * layout.size[1]) as f64;
-        let h = self.half_depth(optics, cloud);
+        let h = slabs.half;
         // Mean area of a kernel: depths are even over the slab, so widths are even from the tail to tail + cone.
         let area = |axis: usize| {
             let cone = optics.cone(axis, h) / optics.pitch[axis];
@@ -149,13 +177,12 @@ impl Parameters {
         let spectra = pixels * pass * ((self.planes * self.rank) as f64 + 1.0);
         spectra + cloud.sources.len() as f64 * dab + levels as f64 * 1e-8
     }
-    /// Memory beside points and field [bytes].
-    pub(crate) fn bytes(&self, optics: &Optics, grid: &Grid, cloud: &Cloud) -> u64 {
+    fn bytes(&self, optics: &Optics, grid: &Grid, cloud: &Cloud, slabs: &Slabs) -> u64 {
         if cloud.sources.is_empty() {
             return 0;
         }
-        let layout = layout(optics, grid, cloud, self);
-        let h = self.half_depth(optics, cloud);
+        let layout = layout(optics, grid, cloud, self, slabs);
+        let h = slabs.half;
         let plane = (self.rank * layout.size[0] * layout.painted * 8) as u64;
         let half = [0, 1].map(|axis| Table::half_width(optics, axis, h, self.tail));
         let axes = if optics.pitch[0] == optics.pitch[1] { 0..1 } else { 0..2 };
@@ -172,10 +199,13 @@ fn tail_error(tail: f64, cone: f64) -> f64 {
     at_ten * (10.0 / tail).powf(1.3) * (-(0.0895f64.powi(2)) * (tail * tail - 100.0)).exp()
 }
 
-/// What the predicted error stands above the measured one of a cloud before the panel, for clouds that show the panel
-/// their cones' edges only: 1.69 times measured where eight lanes paint no more than the tail (sixteen paint up to
-/// fifteen pixels beyond it, and err a tenth less).
-const MARGIN: f64 = 1.85;
+/// What the stated error stands above the model's, by how steeply the panel sees the cloud (1 whole cones, 3 nothing but
+/// their corners): towards the corners the light fades and the kernels' cut tails do not. Measured at most 1.36 up to a
+/// steepness of 1.5, 1.9 at 2.0, 2.8 at 2.45 and 7.1 at 2.74, on clouds that are shifted out of the panel's view.
+fn margin(steepness: f64) -> f64 {
+    let corner = (0.5 * (steepness - 1.0)).clamp(0.0, 1.0);
+    1.45 / (1.0 - corner.powf(1.4)).max(1e-3)
+}
 
 /// Where a point's light has died away on the panel, but for the taper's tail [m]: erfc(2.6)/2 = 1.2e-4.
 fn reach(optics: &Optics, axis: usize, distance: f64) -> f64 {
@@ -184,8 +214,8 @@ fn reach(optics: &Optics, axis: usize, distance: f64) -> f64 {
 }
 
 /// The periodic grid: large enough that no point's light comes round onto the panel.
-fn layout(optics: &Optics, grid: &Grid, cloud: &Cloud, parameters: &Parameters) -> Layout {
-    let h = parameters.half_depth(optics, cloud);
+fn layout(optics: &Optics, grid: &Grid, cloud: &Cloud, parameters: &Parameters, slabs: &Slabs) -> Layout {
+    let h = slabs.half;
     let mut layout = Layout { size: [0; 2], painted: 0, origin: [0; 2] };
     for (axis, pixels) in [grid.width as f64, grid.height as f64].into_iter().enumerate() {
         let halo = Table::half_width(optics, axis, h, parameters.tail) as f64 + 18.0;
@@ -201,7 +231,7 @@ fn layout(optics: &Optics, grid: &Grid, cloud: &Cloud, parameters: &Parameters) 
     layout
 }
 
-/// The smallest 16·2^a·3^b·5^c that is not below `n`: lengths that the transforms are fast at.
+/// The smallest 16·2^a·3^b·5^c, or 7 or 11 times one, that is not below `n`: lengths that the transforms are fast at.
 fn transform_size(n: usize) -> usize {
     (n.div_ceil(16)..)
         .find(|&m| {
@@ -211,7 +241,7 @@ fn transform_size(n: usize) -> usize {
                     rest /= prime;
                 }
             }
-            rest == 1
+            matches!(rest, 1 | 7 | 11)
         })
         .map_or(n, |m| 16 * m)
 }
@@ -225,13 +255,14 @@ pub(crate) fn field(
     set: InstructionSet,
     progress: &Progress,
 ) -> Result<Field> {
-    let Cloud { sources, depths, .. } = cloud;
+    let sources = &cloud.sources;
     if sources.is_empty() {
         return Ok(Field::zeros(*grid, optics.wavelength));
     }
-    let h = parameters.half_depth(optics, cloud);
-    let layout = layout(optics, grid, cloud, parameters);
-    progress.start("hologram: planes", sources.len() as u64 + (layout.size[0] * parameters.planes) as u64);
+    let slabs = parameters.slabs(optics, cloud);
+    let h = slabs.half;
+    let layout = layout(optics, grid, cloud, parameters, &slabs);
+    progress.start("hologram: planes", sources.len() as u64 + (layout.size[0] * slabs.depths.len()) as u64);
     let same = optics.pitch[0] == optics.pitch[1];
     let table = |axis| Table::new(optics, axis, h, parameters.tail, parameters.table, progress);
     let first = table(0);
@@ -239,11 +270,6 @@ pub(crate) fn field(
     let tables = [&first, second.as_ref().unwrap_or(&first)];
     progress.check()?;
     let lambda = optics.wavelength;
-    let middle = |k: usize| depths[0] + h * (2 * k + 1) as f64;
-    let nearest = |s: &Source| {
-        let depth = s.sign * s.distance;
-        (((depth - depths[0]) / (2.0 * h)) as usize).min(parameters.planes - 1)
-    };
     // The kernels carry exp(i2πd(α − ᾱ)) of each axis: the rest of d·f_z is the point's phase.
     let carrier = 1.0 / lambda
         + tables[0].mean
@@ -264,11 +290,10 @@ pub(crate) fn field(
     let samples = layout.size[0] * layout.painted;
     let mut moments: Vec<Vec<Complex32>> = (0..parameters.rank).map(|_| zeroed(samples)).collect();
     let mut spectrum = Spectrum::new(optics, &layout, h, set);
-    for k in 0..parameters.planes {
-        let dabs: Vec<Dab> = sources.par_iter().filter(|s| nearest(s) == k).map(|s| dab(s, middle(k))).collect();
-        if dabs.is_empty() {
-            continue;
-        }
+    for k in 0..slabs.depths.len() {
+        let middle = slabs.plane(k);
+        let is_here = |s: &&Source| slabs.index(s.sign * s.distance) == k;
+        let dabs: Vec<Dab> = sources.par_iter().filter(is_here).map(|s| dab(s, middle)).collect();
         for moment in &mut moments {
             moment.par_chunks_mut(1 << 16).for_each(|part| {
                 if !progress.stopped() {
@@ -278,7 +303,7 @@ pub(crate) fn field(
         }
         let mut canvas = Canvas { width: layout.size[0], moments: &mut moments };
         paint(&mut canvas, &brush, &dabs, set, progress)?;
-        spectrum.add(middle(k), &mut moments, progress)?;
+        spectrum.add(middle, &mut moments, progress)?;
     }
     spectrum.finish(grid, progress)
 }

@@ -17,8 +17,23 @@ pub(crate) struct Shape {
 }
 
 /// Shapes from the slowest to the fastest a pixel.
-const SHAPES: [(usize, usize); 10] =
-    [(32, 4), (32, 8), (32, 16), (32, 32), (64, 32), (64, 64), (96, 64), (96, 96), (128, 96), (128, 128)];
+const SHAPES: [(usize, usize); 15] = [
+    (32, 4),
+    (32, 8),
+    (32, 16),
+    (32, 24),
+    (32, 32),
+    (64, 24),
+    (64, 32),
+    (64, 48),
+    (64, 64),
+    (96, 64),
+    (96, 80),
+    (96, 96),
+    (128, 96),
+    (128, 112),
+    (128, 128),
+];
 
 impl Shape {
     /// The largest tile whose error stays below `error`, for points no nearer than `distance`, seen by the panel under

@@ -1,0 +1,180 @@
+//! Where the planes stand: slabs of least depth that hold every point.
+//!
+//! Clouds are seldom even in depth: a page of text has one depth, a room has walls and air between. Slabs that cover
+//! only what is occupied are thinner than equal parts of the whole, and both the residual that the spectrum corrects
+//! and the area of the kernels go with the thickest slab.
+
+/// Cells that the depths are sorted into.
+const CELLS: usize = 2048;
+
+/// Halvings of the interval in which the least slab depth is sought: to 1e-9 of the cloud's depth.
+const HALVINGS: usize = 30;
+
+/// Points of similar depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Cell {
+    /// Smallest and largest depth in it [m].
+    depth: [f64; 2],
+    /// Σ amplitude².
+    light: f64,
+}
+
+/// The cloud's light by depth: occupied cells only, in order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Depths {
+    cells: Vec<Cell>,
+}
+
+/// Slabs in order of depth, and what they do to the error.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Slabs {
+    /// Smallest and largest depth of each [m].
+    pub(super) depths: Vec<[f64; 2]>,
+    /// Half depth of the thickest, h [m].
+    pub(super) half: f64,
+}
+
+impl Depths {
+    /// Sorts (depth, amplitude) pairs; the same pairs give the same bits.
+    pub(super) fn new(points: impl Iterator<Item = (f64, f64)> + Clone) -> Self {
+        let ends =
+            points.clone().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (d, _)| [low.min(d), high.max(d)]);
+        let scale = CELLS as f64 / (ends[1] - ends[0]).max(f64::MIN_POSITIVE);
+        let empty = Cell { depth: [f64::INFINITY, f64::NEG_INFINITY], light: 0.0 };
+        let mut cells = vec![empty; CELLS];
+        for (depth, amplitude) in points {
+            let cell = &mut cells[(((depth - ends[0]) * scale) as usize).min(CELLS - 1)];
+            cell.depth = [cell.depth[0].min(depth), cell.depth[1].max(depth)];
+            cell.light += amplitude * amplitude;
+        }
+        cells.retain(|cell| cell.depth[0] <= cell.depth[1]);
+        Self { cells }
+    }
+
+    /// Smallest and largest depth [m].
+    #[cfg(test)]
+    fn ends(&self) -> [f64; 2] {
+        [self.cells[0].depth[0], self.cells[self.cells.len() - 1].depth[1]]
+    }
+
+    /// At most `count` slabs that hold all points, the thickest as thin as it can be, but no thinner than 2·`least` [m].
+    pub(super) fn slabs(&self, count: usize, least: f64) -> Slabs {
+        let (Some(first), Some(last)) = (self.cells.first(), self.cells.last()) else {
+            return Slabs { depths: Vec::new(), half: least };
+        };
+        let thickest_cell = self.cells.iter().map(|cell| cell.depth[1] - cell.depth[0]).fold(0.0, f64::max);
+        let (mut low, mut high) = (thickest_cell.max(2.0 * least), last.depth[1] - first.depth[0]);
+        // The greedy cover with slabs of a given depth takes the fewest.
+        if high > low && self.cover(low).len() > count {
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (low + high);
+                if self.cover(middle).len() <= count { high = middle } else { low = middle }
+            }
+        } else {
+            high = low;
+        }
+        let depths = self.cover(high);
+        let half = depths.iter().map(|[from, to]| 0.5 * (to - from)).fold(least, f64::max);
+        Slabs { depths, half }
+    }
+
+    /// Slabs no thicker than `thickness`, each begun at the first depth that those before leave out.
+    fn cover(&self, thickness: f64) -> Vec<[f64; 2]> {
+        let mut slabs: Vec<[f64; 2]> = Vec::new();
+        for cell in &self.cells {
+            match slabs.last_mut() {
+                // A unit in the last place decides nothing.
+                Some(slab) if cell.depth[1] - slab[0] <= thickness * (1.0 + 1e-12) => slab[1] = cell.depth[1],
+                _ => slabs.push(cell.depth),
+            }
+        }
+        slabs
+    }
+
+    /// √⟨(2R + 1)·P_R(u)²⟩ over the light, u = d/h: what a series of `rank` R errs more than where depths are even over
+    /// their slabs (1); at most √(2R + 1), where all stand on the slabs' faces.
+    pub(super) fn unevenness(&self, slabs: &Slabs, rank: usize) -> f64 {
+        let polynomial = |u: f64| match rank {
+            1 => u,
+            2 => 1.5 * u * u - 0.5,
+            3 => (2.5 * u * u - 1.5) * u,
+            _ => (4.375 * u * u - 3.75) * u * u + 0.375,
+        };
+        let (mut sum, mut light) = (0.0, 0.0);
+        for cell in &self.cells {
+            let depth = 0.5 * (cell.depth[0] + cell.depth[1]);
+            let [from, to] = slabs.depths[slabs.index(depth)];
+            let u = (depth - 0.5 * (from + to)) / slabs.half;
+            sum += cell.light * polynomial(u).powi(2);
+            light += cell.light;
+        }
+        // A cloud without light has no error.
+        if light > 0.0 { ((2 * rank + 1) as f64 * sum / light).sqrt() } else { 0.0 }
+    }
+}
+
+impl Slabs {
+    /// The slab of a depth.
+    pub(super) fn index(&self, depth: f64) -> usize {
+        self.depths.partition_point(|slab| slab[1] < depth).min(self.depths.len().saturating_sub(1))
+    }
+    /// Depth of a slab's plane [m].
+    pub(super) fn plane(&self, index: usize) -> f64 {
+        0.5 * (self.depths[index][0] + self.depths[index][1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn even(n: usize) -> Vec<(f64, f64)> {
+        (0..n).map(|i| (-0.3 + 0.1 * i as f64 / (n - 1) as f64, 1.0)).collect()
+    }
+
+    #[test]
+    fn even_depths_are_cut_into_equal_parts() {
+        let depths = Depths::new(even(100_001).into_iter());
+        assert_eq!(depths.ends(), [-0.3, -0.3 + 0.1]);
+        for count in [1, 2, 3, 8, 32] {
+            let slabs = depths.slabs(count, 1e-9);
+            assert_eq!(slabs.depths.len(), count);
+            assert!((slabs.half * count as f64 / 0.05 - 1.0).abs() < 0.02, "{count}: {}", slabs.half);
+            for rank in 1..=4 {
+                let unevenness = depths.unevenness(&slabs, rank);
+                assert!((unevenness - 1.0).abs() < 0.05, "{count}, rank {rank}: {unevenness}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_point_lies_in_its_slab_and_layers_have_slabs_of_their_own() {
+        let layers: Vec<(f64, f64)> = even(900).into_iter().map(|(d, a)| ((d * 30.0).round() / 30.0, a)).collect();
+        let depths = Depths::new(layers.iter().copied());
+        let slabs = depths.slabs(8, 1e-7);
+        // Four layers, whatever number of planes is allowed.
+        assert!(slabs.depths.len() == 4 && slabs.half == 1e-7, "{slabs:?}");
+        let few = depths.slabs(2, 1e-7);
+        assert!(few.depths.len() == 2 && (few.half - 1.0 / 60.0).abs() < 1e-12, "{few:?}");
+        // All on the faces: the worst that can be.
+        assert!((depths.unevenness(&few, 2) - 5f64.sqrt()).abs() < 1e-9);
+        for slabs in [slabs, few] {
+            for (depth, _) in &layers {
+                let index = slabs.index(*depth);
+                let [from, to] = slabs.depths[index];
+                assert!(from <= *depth && *depth <= to && (depth - slabs.plane(index)).abs() <= slabs.half);
+            }
+        }
+    }
+
+    #[test]
+    fn one_depth_no_depth_and_depths_on_both_sides() {
+        let one = Depths::new([(0.1, 1.0), (0.1, 2.0)].into_iter());
+        let slabs = one.slabs(5, 1e-6);
+        assert_eq!((slabs.depths, slabs.half), (vec![[0.1, 0.1]], 1e-6));
+        assert!(Depths::new(std::iter::empty()).slabs(3, 1e-6).depths.is_empty());
+        let both = Depths::new([(-0.1, 1.0), (0.1, 1.0)].into_iter());
+        assert_eq!(both.slabs(1, 1e-6).half, 0.1);
+        assert_eq!(both.slabs(2, 1e-6).half, 1e-6);
+    }
+}
