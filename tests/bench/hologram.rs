@@ -163,10 +163,7 @@ fn growth() {
     ] {
         for &n in counts {
             let points = cloud(n, &hd(), [-0.25, -0.20], false);
-            let repeats = if n < 100_000 { 3 } else { 2 };
-            if let Some(taken) =
-                run(&format!("{n} points"), &points, &hd(), &settings(Some(method), 2e-3), &[], repeats)
-            {
+            if let Some(taken) = run(&format!("{n} points"), &points, &hd(), &settings(Some(method), 2e-3), &[], 3) {
                 println!("    model {:.2} of measured", taken.predicted / taken.median);
             }
         }
@@ -175,7 +172,7 @@ fn growth() {
             let n = if method == Method::Planes { 100_000 } else { 500 };
             let points = cloud(n, &grid, [-0.25, -0.20], false);
             let label = format!("{:.1} Mpx, {n} points", grid.len() as f64 * 1e-6);
-            if let Some(taken) = run(&label, &points, &grid, &settings(Some(method), 2e-3), &[], 2) {
+            if let Some(taken) = run(&label, &points, &grid, &settings(Some(method), 2e-3), &[], 3) {
                 println!("    model {:.2} of measured", taken.predicted / taken.median);
             }
         }

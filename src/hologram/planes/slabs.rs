@@ -1,8 +1,10 @@
-//! Where the planes stand: slabs of least depth that hold every point.
+//! Where the planes stand: slabs of least depth that hold every point, and the series over a slab.
 //!
 //! Clouds are seldom even in depth: a page of text has one depth, a room has walls and air between. Slabs that cover
 //! only what is occupied are thinner than equal parts of the whole, and both the residual that the spectrum corrects
 //! and the area of the kernels go with the thickest slab.
+
+use crate::hologram::lanes::Lanes;
 
 /// Cells that the depths are sorted into.
 const CELLS: usize = 2048;
@@ -124,9 +126,44 @@ impl Slabs {
     }
 }
 
+/// p_r(x) of the Legendre series up to P₃, r < `rank`, by the power series of the spherical Bessel functions j_l to 1e-6
+/// for |x| ≤ 1 (x stays below the fourth root of the rank's error).
+///
+/// # Safety
+/// The instruction set of `L` must be enabled.
+#[inline(always)]
+pub(super) unsafe fn legendre<L: Lanes>(x: L, rank: usize) -> [L; 4] {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let w = x.mul(x);
+        let series =
+            |terms: [f32; 4]| terms[..3].iter().rev().fold(L::splat(terms[3]), |sum, &term| sum.fma(w, L::splat(term)));
+        let zero = L::splat(0.0);
+        // Under the name of j_l: (2l + 1)·j_l(x).
+        let j0 = series([1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0]);
+        if rank == 1 {
+            return [j0, zero, zero, zero];
+        }
+        let j1 = series([1.0, -1.0 / 10.0, 1.0 / 280.0, -1.0 / 15_120.0]).mul(x);
+        if rank == 2 {
+            return [j0, j1, zero, zero];
+        }
+        let j2 = series([1.0 / 3.0, -1.0 / 42.0, 1.0 / 1512.0, -1.0 / 99_792.0]).mul(w);
+        // −P₂ = ½ − (3/2)u².
+        let (p0, p2) = (j2.fma(L::splat(0.5), j0), j2.mul(L::splat(1.5)));
+        if rank == 3 {
+            return [p0, j1, p2, zero];
+        }
+        let j3 = series([1.0 / 15.0, -1.0 / 270.0, 1.0 / 11_880.0, -1.0 / 926_640.0]).mul(w).mul(x);
+        // −P₃ = (3/2)u − (5/2)u³.
+        [p0, j3.fma(L::splat(1.5), j1), p2, j3.mul(L::splat(2.5))]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::field::Complex64;
 
     fn even(n: usize) -> Vec<(f64, f64)> {
         (0..n).map(|i| (-0.3 + 0.1 * i as f64 / (n - 1) as f64, 1.0)).collect()
@@ -176,5 +213,47 @@ mod tests {
         let both = Depths::new([(-0.1, 1.0), (0.1, 1.0)].into_iter());
         assert_eq!(both.slabs(1, 1e-6).half, 0.1);
         assert_eq!(both.slabs(2, 1e-6).half, 1e-6);
+    }
+
+    #[test]
+    fn the_series_is_the_best_polynomial_over_a_slab() {
+        for rank in 1..=4 {
+            for x in [0.05f32, 0.3, 0.9] {
+                // SAFETY: the portable set is on every machine.
+                let weights = unsafe { legendre(crate::hologram::lanes::Portable::splat(x), rank) };
+                let mut values = [[0.0f32; 8]; 4];
+                for (value, weight) in values.iter_mut().zip(weights) {
+                    // SAFETY: eight lanes.
+                    unsafe { weight.store(value.as_mut_ptr()) };
+                }
+                // The error of Σ iʳ p_r uʳ against e^{ixu}, its mean square over u, and its part along 1 and u.
+                let (mut square, mut along) = (0.0, [0.0; 2]);
+                let steps = 2000;
+                for step in 0..steps {
+                    let u = (step as f64 + 0.5) * 2.0 / steps as f64 - 1.0;
+                    let mut sum = Complex64::cis(f64::from(x) * u);
+                    for (r, value) in values.iter().enumerate().take(rank) {
+                        sum -= Complex64::i().powu(r as u32) * f64::from(value[0]) * u.powi(r as i32);
+                    }
+                    square += sum.norm_sqr() / f64::from(steps);
+                    along = [along[0] + sum.re / f64::from(steps), along[1] + sum.im * u / f64::from(steps)];
+                }
+                let x = f64::from(x);
+                // The first term that is left out: (2R + 1)·j_R(x)·P_R(u), P_R with the mean square 1/(2R + 1).
+                let expected = [
+                    x / 3f64.sqrt(),
+                    x * x * 5f64.sqrt() / 15.0,
+                    x.powi(3) * 7f64.sqrt() / 105.0,
+                    x.powi(4) * 3.0 / 945.0,
+                ];
+                let found = square.sqrt();
+                let wanted = expected[rank - 1];
+                assert!(
+                    (found / wanted - 1.0).abs() < 0.1 || found < 3e-7,
+                    "rank {rank}, {x}: {found:.2e} {wanted:.2e}"
+                );
+                assert!(along[0].abs() < 3e-6 && (rank == 1 || along[1].abs() < 3e-6), "rank {rank}, {x}: {along:?}");
+            }
+        }
     }
 }

@@ -11,6 +11,7 @@
 //! e^{ixu} = Σ (2l + 1) i^l j_l(x) P_l(u) up to l = R − 1, u = d/h: the least error over a slab with even depths. ζ_k f_z is split as ζ_k S(f_x) + ζ_k (S(f_y) − 1/λ) + ζ_k/λ·C: the first
 //! two are reduced modulo one turn in f64, and C, written without cancellation, is small enough for f32.
 
+use super::slabs::legendre;
 use super::table::mean_square;
 use crate::error::Result;
 use crate::field::{Complex32, Field, Grid, zeroed};
@@ -315,40 +316,6 @@ unsafe fn prepare<L: Lanes>(shared: &Shared, a: f64, limit: f32, residual: &mut 
             gain.store(amplitude.as_mut_ptr().add(k));
             k += L::COUNT;
         }
-    }
-}
-
-/// p_r(x) of the Legendre series up to P₃, r < `rank`, by the power series of the spherical Bessel functions j_l to 1e-6
-/// for |x| ≤ 1 (x stays below the fourth root of the rank's error).
-///
-/// # Safety
-/// The instruction set of `L` must be enabled.
-#[inline(always)]
-unsafe fn legendre<L: Lanes>(x: L, rank: usize) -> [L; 4] {
-    // SAFETY: the caller's promise.
-    unsafe {
-        let w = x.mul(x);
-        let series =
-            |terms: [f32; 4]| terms[..3].iter().rev().fold(L::splat(terms[3]), |sum, &term| sum.fma(w, L::splat(term)));
-        let zero = L::splat(0.0);
-        // Under the name of j_l: (2l + 1)·j_l(x).
-        let j0 = series([1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0]);
-        if rank == 1 {
-            return [j0, zero, zero, zero];
-        }
-        let j1 = series([1.0, -1.0 / 10.0, 1.0 / 280.0, -1.0 / 15_120.0]).mul(x);
-        if rank == 2 {
-            return [j0, j1, zero, zero];
-        }
-        let j2 = series([1.0 / 3.0, -1.0 / 42.0, 1.0 / 1512.0, -1.0 / 99_792.0]).mul(w);
-        // −P₂ = ½ − (3/2)u².
-        let (p0, p2) = (j2.fma(L::splat(0.5), j0), j2.mul(L::splat(1.5)));
-        if rank == 3 {
-            return [p0, j1, p2, zero];
-        }
-        let j3 = series([1.0 / 15.0, -1.0 / 270.0, 1.0 / 11_880.0, -1.0 / 926_640.0]).mul(w).mul(x);
-        // −P₃ = (3/2)u − (5/2)u³.
-        [p0, j3.fma(L::splat(1.5), j1), p2, j3.mul(L::splat(2.5))]
     }
 }
 

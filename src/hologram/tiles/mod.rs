@@ -21,7 +21,7 @@ use super::definition::Optics;
 use super::lanes::{InstructionSet, dispatch};
 use super::sources::{Source, tilt};
 use crate::error::Result;
-use crate::field::{Field, Grid};
+use crate::field::{Complex32, Field, Grid};
 use crate::progress::Progress;
 use kernel::{BATCH, Job, Panels, Relative, add_batch};
 use pixels::add_exact;
@@ -220,7 +220,7 @@ pub(crate) fn add(
                 let first = members.partition_point(|s| s.x < center[0] - reach);
                 let last = members.partition_point(|s| s.x <= center[0] + reach);
                 let mut batch = [Relative::default(); BATCH];
-                let mut count = 0;
+                let (mut count, mut lit) = (0, false);
                 for s in &members[first..last] {
                     let (dx, dy) = (center[0] - s.x, center[1] - s.y);
                     let dark =
@@ -236,23 +236,28 @@ pub(crate) fn add(
                             return None;
                         }
                         flush(set, &job, &batch, &mut panels, exact);
-                        count = 0;
+                        (count, lit) = (0, true);
                     }
                 }
                 if count > 0 {
                     flush(set, &job, &batch[..count], &mut panels, exact);
                 }
                 progress.advance(work);
-                Some(panels)
+                (lit || count > 0).then_some(panels)
             })
             .collect();
         progress.check()?;
-        for (&tile, panels) in wave.iter().zip(&results) {
-            let at = [tile % across * width, tile / across * height];
-            if let Some(panels) = panels {
-                scatter(field, at, [width, height], panels);
+        // Tiles without light are left as they are; rows of tiles are bands of the field that one thread each adds to.
+        let first = wave[0] / across;
+        let last = wave[wave.len() - 1] / across;
+        let bands = field.samples.par_chunks_mut(grid.width * height).enumerate().skip(first).take(last + 1 - first);
+        bands.for_each(|(row, band)| {
+            for (&tile, panels) in wave.iter().zip(&results).filter(|(tile, _)| **tile / across == row) {
+                if let Some(panels) = panels {
+                    scatter(band, grid.width, tile % across * width, width, panels);
+                }
             }
-        }
+        });
     }
     Ok(())
 }
@@ -268,15 +273,13 @@ fn flush(set: InstructionSet, job: &Job, points: &[Relative], panels: &mut Panel
     }
 }
 
-/// Adds a tile at column and row `at` to the field, without what overhangs it.
-fn scatter(field: &mut Field, at: [usize; 2], size: [usize; 2], panels: &Panels) {
-    let grid = field.grid;
-    let width = size[0].min(grid.width - at[0]);
-    for row in 0..size[1].min(grid.height - at[1]) {
-        let to = (at[1] + row) * grid.width + at[0];
-        let from = row * size[0];
-        let parts = panels.re.values()[from..from + width].iter().zip(&panels.im.values()[from..from + width]);
-        for (u, (re, im)) in field.samples[to..to + width].iter_mut().zip(parts) {
+/// Adds a tile of `width` columns to a band of rows of the field, from `column` on, without what overhangs.
+fn scatter(band: &mut [Complex32], stride: usize, column: usize, width: usize, panels: &Panels) {
+    let count = width.min(stride - column);
+    for (row, samples) in band.chunks_exact_mut(stride).enumerate() {
+        let from = row * width;
+        let parts = panels.re.values()[from..from + count].iter().zip(&panels.im.values()[from..from + count]);
+        for (u, (re, im)) in samples[column..column + count].iter_mut().zip(parts) {
             u.re += re;
             u.im += im;
         }
