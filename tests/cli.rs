@@ -186,6 +186,35 @@ fn bad_profiles_and_flags_end_in_one_line() {
 }
 
 #[test]
+fn bad_pictures_and_stacks_end_in_one_line() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    for (name, size) in [("a.png", 8), ("b.png", 9)] {
+        image::RgbImage::from_pixel(size, 6, image::Rgb([200, 100, 0])).save(f.join(name)).expect("picture");
+    }
+    image::RgbImage::new(8, 6).save(f.join("black.png")).expect("picture");
+    write(f, "torn.png", b"\x89PNG\r\n\x1a\n0000");
+    refused(f, &["compute", "a.png+b.png", "--layers", "4"], "9×6 pixels");
+    refused(f, &["compute", "a.png@100mm+b.png@120mm"], "9×6 pixels");
+    refused(f, &["compute", "a.png@100mm+b.png"], "has no distance");
+    refused(f, &["compute", "a.png@ten"], "ten");
+    refused(f, &["compute", "torn.png@100mm"], "torn.png");
+    refused(f, &["compute", "gone.png@100mm"], "gone.png");
+    refused(f, &["compute", "black.png@100mm"], "black everywhere");
+    refused(f, &["compute", "a.png@-700mm"], "not in front of the eye");
+    refused(f, &["compute", "a.png+a.png", "--layers", "0"], "one to 4096");
+    refused(f, &["compute", "a.png+a.png", "--layers", "16", "--memory", "100MB"], "give more memory or fewer layers");
+    refused(f, &["compute", "a.png@100mm", "--layers", "3"], "leave --layers out");
+    refused(f, &["compute", &scene("cornell.gltf"), "--layers", "3"], "picture with depth");
+    refused(f, &["show", "a.png@100mm"], "focal stack");
+    refused(
+        f,
+        &["points", &scene("cornell.gltf"), "--rays", "20x20", "--placement", "model", "--depth-map", "d.png"],
+        "--placement window",
+    );
+}
+
+#[test]
 fn a_reference_that_aliases_is_refused_with_numbers() {
     let folder = tempfile::tempdir().expect("folder");
     let f = folder.path();

@@ -37,7 +37,7 @@ pub(crate) enum Command {
     Points(PointsArgs),
     /// Compute the field of a scene, point cloud, or picture with depth on the panel.
     #[command(
-        after_help = "Examples:\n  holodrive compute points.ply -o field.npy\n  holodrive compute rgb.png+depth.png --panel holoeye-pluto-2.1 --wavelength 532nm -o field.npy\n  holodrive compute points.ply --wavelengths 638nm,520nm,450nm -o field.npy"
+        after_help = "Examples:\n  holodrive compute points.ply -o field.npy\n  holodrive compute rgb.png+depth.png --panel holoeye-pluto-2.1 --wavelength 532nm -o field.npy\n  holodrive compute rgb.png+depth.png --layers 16 -o field.npy\n  holodrive compute near.png@100mm+far.png@150mm -o field.npy\n  holodrive compute points.ply --wavelengths 638nm,520nm,450nm -o field.npy"
     )]
     Compute(ComputeArgs),
     /// Carry a field from its plane to another.
@@ -134,6 +134,9 @@ pub(crate) struct PointsArgs {
     /// Also write the traced picture: .npy (H×W×3 float32 linear radiance) or .png.
     #[arg(long, value_name = "FILE")]
     pub(crate) picture: Option<PathBuf>,
+    /// Also write a depth map of the traced picture: .png, 16-bit gray, between --near and --far.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) depth_map: Option<PathBuf>,
     /// Frame of the positions.
     #[arg(long, value_enum, default_value_t = FrameArg::Hologram)]
     pub(crate) frame: FrameArg,
@@ -149,7 +152,8 @@ pub(crate) struct PointsArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct ComputeArgs {
-    /// A scene (.gltf, .glb), a point cloud (.ply), or a picture with its depth map (rgb.png+depth.png).
+    /// A scene (.gltf, .glb), a point cloud (.ply), a picture with its depth map (rgb.png+depth.png), or a focal stack
+    /// of pictures, each with its distance behind the panel (near.png@100mm+far.png@150mm).
     pub(crate) input: PathBuf,
     /// The field to write (H×W complex64, metadata beside it).
     #[arg(short, long, default_value = "field.npy", value_name = "FILE")]
@@ -163,8 +167,14 @@ pub(crate) struct ComputeArgs {
     #[command(flatten)]
     pub(crate) placement: PlacementArgs,
     /// Engine that computes the field [default: the planner chooses].
-    #[arg(long = "method", value_enum, value_name = "NAME")]
+    #[arg(long = "method", value_enum, value_name = "NAME", conflicts_with = "layers")]
     pub(crate) engine: Option<EngineArg>,
+    /// A picture with depth in this many planes, by fast transforms and without gaps, instead of points.
+    #[arg(long, value_name = "N")]
+    pub(crate) layers: Option<usize>,
+    /// Layers do not hide what is behind them.
+    #[arg(long, requires = "layers")]
+    pub(crate) see_through: bool,
     #[command(flatten)]
     pub(crate) hologram: HologramArgs,
 }

@@ -5,8 +5,11 @@ use super::args::{
 };
 use super::bar::Bar;
 use super::colour;
+use super::layers;
 use super::light::report_gamut;
-use super::load::{Input, Panel, channel, hologram_settings, input, load_points, panel, panel_in_color};
+use super::load::{
+    Input, Panel, channel, depth_scale, hologram_settings, input, load_points, panel, panel_in_color, placed_by,
+};
 use super::report::{Report, seconds};
 use glam::DVec2;
 use holodrive::encode::{EncodeSettings, Encoding, Reference};
@@ -15,7 +18,7 @@ use holodrive::hologram::Computed;
 use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Frame, Modulation, Origin, PanelProfile};
 use holodrive::pipeline::{self, Lit};
-use holodrive::points::{PointCloud, ply};
+use holodrive::points::{Placement, PointCloud, images, ply};
 use holodrive::progress::Progress;
 use holodrive::propagation::{self, Kernel, Propagator};
 use holodrive::reconstruction::{self, Picture, Scale, View, ViewSettings, write_rgb_png};
@@ -53,6 +56,17 @@ pub(super) fn points(args: &PointsArgs) -> Result<Report> {
     if let Some(picture) = &args.picture {
         write_traced(picture, &lit)?;
         report.add("picture", picture.display().to_string(), format!("picture      {}", picture.display()));
+    }
+    if let Some(map) = &args.depth_map {
+        let Placement::Window { near, far, .. } = placed_by(&args.placement) else {
+            return Err(Error::parameter(
+                "depth-map",
+                "is for --placement window, whose --near and --far it runs between",
+            ));
+        };
+        let size = [lit.view.width as u32, lit.view.height as u32];
+        images::write_depths(map, size, &lit.view.depths, depth_scale(args.placement.depth_scale), [near, far])?;
+        report.add("depth_map", map.display().to_string(), format!("depth map    {}", map.display()));
     }
     ply::write(&args.output, &cloud, &metadata)?;
     report.add("output", args.output.display().to_string(), format!("points       {}", args.output.display()));
@@ -98,6 +112,10 @@ pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
     let panel = panel_in_color(&args.panel, &args.color, &mut report)?;
     let bar = Bar::new();
     let source = input(&args.input)?;
+    if args.layers.is_some() || matches!(source, Input::Stack(_)) {
+        layers::compute(args, &source, &panel, &bar.progress, &mut report)?;
+        return Ok(report);
+    }
     let points = load_points(&source, (&args.light, &args.placement, White::Auto), &panel, &bar.progress, &mut report)?;
     if let Some(lasers) = &panel.lasers {
         colour::compute(args, (&panel, lasers), &points, &bar.progress, &mut report)?;

@@ -20,6 +20,7 @@ use holodrive::points::{Channel, Placement, PointCloud, images, ply};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::Picture;
 use holodrive::scene::gltf::{Choice, Clip, LoadOptions};
+use holodrive::units;
 use holodrive::{Error, Result};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -114,10 +115,17 @@ pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, defau
 }
 
 /// Flags count distances behind the panel; the library's z is negative there.
-fn placed_by(args: &PlacementArgs) -> Placement {
+pub(super) fn placed_by(args: &PlacementArgs) -> Placement {
     match args.placement {
         PlacementArg::Window => Placement::Window { eye: args.viewer, near: -args.near, far: -args.far },
         PlacementArg::Model => Placement::Model { eye: args.viewer, z: -args.distance, scale: args.scale },
+    }
+}
+
+pub(super) fn depth_scale(scale: DepthArg) -> images::DepthScale {
+    match scale {
+        DepthArg::WhiteNear => images::DepthScale::WhiteNear,
+        DepthArg::BlackNear => images::DepthScale::BlackNear,
     }
 }
 
@@ -147,11 +155,13 @@ pub(super) fn channel(args: &HologramArgs) -> Channel {
 }
 
 /// What kind of file an input is, by its name.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Input {
     Scene(PathBuf),
     Points(PathBuf),
     Images(PathBuf, PathBuf),
+    /// Pictures and their depths z [m].
+    Stack(Vec<(PathBuf, f64)>),
     Field(PathBuf),
     Frame(PathBuf),
 }
@@ -164,6 +174,9 @@ pub(super) fn input(path: &Path) -> Result<Input> {
         && [rgb, depth].iter().all(|p| pictures.iter().any(|e| p.to_lowercase().ends_with(e)))
     {
         return Ok(Input::Images(rgb.into(), depth.into()));
+    }
+    if !path.exists() && text.contains('@') {
+        return stack(&text);
     }
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let found = match extension.as_str() {
@@ -180,6 +193,20 @@ pub(super) fn input(path: &Path) -> Result<Input> {
     // Found out before an output folder is made.
     std::fs::File::open(path).map_err(Error::io(path))?;
     Ok(found)
+}
+
+/// `near.png@100mm+far.png@150mm`: distances count behind the panel.
+fn stack(text: &str) -> Result<Input> {
+    let one = |part: &str| {
+        let (path, distance) = part.rsplit_once('@').ok_or_else(|| {
+            let what = format!("`{part}` has no distance; write near.png@100mm+far.png@150mm");
+            Error::parameter("focal stack", what)
+        })?;
+        let distance =
+            units::length(distance).map_err(|why| Error::parameter("focal stack", format!("{path}: {why}")))?;
+        Ok((PathBuf::from(path), -distance))
+    };
+    text.split('+').map(one).collect::<Result<_>>().map(Input::Stack)
 }
 
 /// Points with what is known of them.
@@ -240,10 +267,7 @@ pub(super) fn load_points(
             Ok(Points { cloud: read.cloud, metadata, lit: None, path_eye })
         }
         Input::Images(rgb, depth) => {
-            let scale = match placement.depth_scale {
-                DepthArg::WhiteNear => images::DepthScale::WhiteNear,
-                DepthArg::BlackNear => images::DepthScale::BlackNear,
-            };
+            let scale = depth_scale(placement.depth_scale);
             let seed = match settings.phase {
                 Phase::Zero => None,
                 Phase::Random { seed } => Some(seed),
@@ -255,6 +279,10 @@ pub(super) fn load_points(
             report_cloud(&cloud, begin.elapsed().as_secs_f64(), report);
             let metadata = ply::Metadata { scene: rgb.display().to_string(), ..ply::Metadata::default() };
             Ok(Points { cloud, metadata, lit: None, path_eye: None })
+        }
+        Input::Stack(_) => {
+            let what = "a focal stack has no points; `compute` takes it, and `encode` and `reconstruct` its field";
+            Err(Error::parameter("input", what))
         }
         Input::Field(path) | Input::Frame(path) => {
             Err(Error::input(path, "is no scene, point cloud or picture with depth (rgb.png+depth.png)"))

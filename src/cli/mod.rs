@@ -4,6 +4,7 @@ mod args;
 mod bar;
 mod colour;
 mod commands;
+mod layers;
 mod light;
 mod load;
 mod monitors;

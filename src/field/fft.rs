@@ -5,7 +5,23 @@
 use num_complex::Complex;
 use rayon::prelude::*;
 use rustfft::{Fft, FftNum, FftPlanner};
-use std::sync::Arc;
+use std::any::{Any, TypeId};
+use std::collections::HashMap;
+use std::sync::{Arc, LazyLock, Mutex};
+
+/// Forward and inverse transforms of a length; each length is planned once in the life of the process.
+///
+/// Forward: exp(−i2πkn/N), inverse: exp(+i2πkn/N), neither with a factor.
+pub fn plans<T: FftNum>(length: usize) -> [Arc<dyn Fft<T>>; 2] {
+    /// A planner of each precision; it keeps its plans.
+    static PLANNERS: LazyLock<Mutex<HashMap<TypeId, Box<dyn Any + Send>>>> = LazyLock::new(Mutex::default);
+    // A thread that panicked while it planned left the planner as it was.
+    let mut planners = PLANNERS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let planner = planners.entry(TypeId::of::<T>()).or_insert_with(|| Box::new(FftPlanner::<T>::new()));
+    let mut fresh = FftPlanner::new();
+    let planner = planner.downcast_mut::<FftPlanner<T>>().unwrap_or(&mut fresh);
+    [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)]
+}
 
 /// Columns that one task transforms together: 16 columns of complex f32 are two cache lines a row.
 const STRIP: usize = 16;
@@ -30,10 +46,7 @@ impl<T: FftNum> std::fmt::Debug for Fft2<T> {
 impl<T: FftNum> Fft2<T> {
     /// Plans transforms of `width × height` samples.
     pub fn new(width: usize, height: usize) -> Self {
-        let mut planner = FftPlanner::new();
-        let row = [planner.plan_fft_forward(width), planner.plan_fft_inverse(width)];
-        let column = [planner.plan_fft_forward(height), planner.plan_fft_inverse(height)];
-        Self { width, height, row, column }
+        Self { width, height, row: plans(width), column: plans(height) }
     }
 
     /// Σ u·exp(−i2π(…)), in place.

@@ -5,7 +5,7 @@ pub mod grid;
 mod memory;
 pub mod npy;
 
-pub use fft::Fft2;
+pub use fft::{Fft2, plans};
 pub use grid::Grid;
 pub use memory::zeroed;
 pub use num_complex::{Complex, Complex32, Complex64};

@@ -124,9 +124,12 @@ impl Optics {
         if v * v > 40.0 * (1.0 + q * q) {
             return (Complex64::from(if v < 0.0 { 1.0 } else { 0.0 }), Complex64::default());
         }
-        let root = Complex64::new(1.0, -q).sqrt();
-        let v = Complex64::from(v) / root;
-        (0.5 * erfc(v), -(-v * v).exp() / (root * (taper.width * PI.sqrt())))
+        // √(1 − iq), by its parts.
+        let re = (0.5 * ((1.0 + q * q).sqrt() + 1.0)).sqrt();
+        let inverse = Complex64::new(re, -0.5 * q / re).inv();
+        let v = v * inverse;
+        let gauss = (-v * v).exp();
+        (0.5 * erfc_with(v, gauss), -gauss * inverse / (taper.width * PI.sqrt()))
     }
     /// The far form for a diverging wave of unit amplitude and phase zero, Δ and distance from the panel in metres.
     pub fn far(&self, dx: f64, dy: f64, distance: f64) -> Complex64 {
@@ -149,13 +152,13 @@ impl Optics {
 /// erfc(z) = e^{−z²}·w(iz) for Re z ≥ 0 with the rational series of Weideman, "Computation of the complex error
 /// function", SIAM J. Numer. Anal. 31 (1994), eq. 38: w(iz) = 2/(L + z)²·Σ aₙZⁿ + 1/(√π(L + z)), Z = (L − z)/(L + z).
 pub fn erfc(z: Complex64) -> Complex64 {
+    erfc_with(z, (-z * z).exp())
+}
+
+/// [`erfc`] where e^{−z²} is known.
+fn erfc_with(z: Complex64, gauss: Complex64) -> Complex64 {
     if z.re < 0.0 {
-        return 2.0 - erfc(-z);
-    }
-    let square = z * z;
-    // |erfc| < e^{−40}/(6π½) there: below f64's resolution of the 1 or 2 that it stands beside.
-    if square.re > 40.0 {
-        return Complex64::default();
+        return 2.0 - erfc_with(-z, gauss);
     }
     static SERIES: LazyLock<Weideman> = LazyLock::new(Weideman::new);
     let Weideman { scale, terms } = &*SERIES;
@@ -165,7 +168,7 @@ pub fn erfc(z: Complex64) -> Complex64 {
     for term in terms.iter().rev() {
         sum = sum * ratio + term;
     }
-    (-square).exp() * outer * (2.0 * outer * sum + 1.0 / PI.sqrt())
+    gauss * outer * (2.0 * outer * sum + 1.0 / PI.sqrt())
 }
 
 /// Terms of the rational series of w.

@@ -17,10 +17,10 @@
 use super::Source;
 use super::definition::Optics;
 use crate::error::Result;
-use crate::field::{Complex32, Complex64, Field};
+use crate::field::{Complex32, Complex64, Field, plans};
 use crate::progress::Progress;
 use rayon::prelude::*;
-use rustfft::{Fft, FftPlanner};
+use rustfft::Fft;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -128,10 +128,11 @@ impl Plans {
     /// in the spectrum.
     fn sum(&mut self, spectrum: &mut [Complex64]) {
         let n = spectrum.len();
+        // Looked up here first: the process' own plans are behind a lock.
         let plan = match self.plans.iter().find(|plan| plan.len() == n) {
             Some(plan) => plan.clone(),
             None => {
-                self.plans.push(FftPlanner::new().plan_fft_inverse(n));
+                self.plans.push(plans(n)[1].clone());
                 self.plans[self.plans.len() - 1].clone()
             }
         };

@@ -4,9 +4,11 @@ use super::placement::Placement;
 use super::{PointCloud, PointSource, luminance};
 use crate::error::{Error, Result};
 use crate::field::Grid;
+use crate::files;
 use crate::random::Random;
 use crate::scene::texture::linear_from_srgb;
 use glam::DVec3;
+use image::{ImageBuffer, Luma, Rgb};
 use std::path::Path;
 
 /// Which end of the depth map's gray scale is near.
@@ -19,13 +21,140 @@ pub enum DepthScale {
     BlackNear,
 }
 
-/// Reads `rgb` (sRGB-coded, 8 or 16 bit) and `depth` (gray, 8 or 16 bit, same size) into points.
+/// The viewing window that a picture fills: the panel as seen from the eye.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// Distance of the eye in front of the panel [m].
+    pub eye: f64,
+    /// Half width and half height on the panel [m].
+    pub half: [f64; 2],
+}
+
+impl Window {
+    /// The largest window of a picture's shape on the panel.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a model placement, or distances that are not in order.
+    pub fn new(placement: &Placement, [width, height]: [u32; 2], panel: &Grid) -> Result<Self> {
+        let Placement::Window { eye, near, far } = *placement else {
+            let what = "a picture with depth has no scene to make a model of; use window";
+            return Err(Error::parameter("placement", what));
+        };
+        if !(eye > 0.0 && eye > near && far <= near) {
+            let what = format!("eye {eye} m, near {near} m, far {far} m are not in order");
+            return Err(Error::parameter("near/far", what));
+        }
+        let shape = f64::from(height) / f64::from(width);
+        let half_height = 0.5 * panel.extent_y().min(panel.extent_x() * shape);
+        Ok(Self { eye, half: [half_height / shape, half_height] })
+    }
+    /// How much wider than on the panel it is at depth z [m].
+    pub fn spread(&self, z: f64) -> f64 {
+        (self.eye - z) / self.eye
+    }
+}
+
+/// A picture and its depth map.
+#[derive(Clone, Debug)]
+pub struct RgbDepth {
+    /// sRGB-coded.
+    pub(super) picture: ImageBuffer<Rgb<u16>, Vec<u16>>,
+    /// Gray, of the same size.
+    pub(super) depths: ImageBuffer<Luma<u16>, Vec<u16>>,
+    pub(super) scale: DepthScale,
+    /// Depth z of the gray scale's near and far end [m].
+    pub(super) ends: [f64; 2],
+}
+
+/// Opens a picture.
+pub(super) fn open(path: &Path) -> Result<image::DynamicImage> {
+    if !path.is_file() {
+        let missing = std::io::Error::from(std::io::ErrorKind::NotFound);
+        return Err(Error::Io { path: path.into(), source: missing });
+    }
+    image::open(path).map_err(|e| Error::input(path, format!("not a picture that can be read: {e}")))
+}
+
+impl RgbDepth {
+    /// Reads `rgb` (sRGB-coded, 8 or 16 bit) and `depth` (gray, 8 or 16 bit, same size).
+    ///
+    /// # Errors
+    /// [`Error::Input`] for files that are not pictures or differ in size; [`Error::Parameter`] for a model placement.
+    pub fn read(rgb: &Path, depth: &Path, scale: DepthScale, placement: &Placement) -> Result<Self> {
+        let Placement::Window { near, far, .. } = *placement else {
+            let what = "a picture with depth has no scene to make a model of; use window";
+            return Err(Error::parameter("placement", what));
+        };
+        let picture = open(rgb)?.into_rgb16();
+        let depths = open(depth)?.into_luma16();
+        if picture.dimensions() != depths.dimensions() {
+            let ((w, h), (dw, dh)) = (picture.dimensions(), depths.dimensions());
+            let what = format!("{dw}×{dh} pixels, but {} has {w}×{h}; they must be equal", rgb.display());
+            return Err(Error::input(depth, what));
+        }
+        Ok(Self { picture, depths, scale, ends: [near, far] })
+    }
+    /// Columns and rows.
+    pub fn size(&self) -> [u32; 2] {
+        [self.picture.width(), self.picture.height()]
+    }
+    /// Depth z of every pixel, row by row [m].
+    pub(super) fn depths(&self) -> impl Iterator<Item = f64> + '_ {
+        self.depths.pixels().map(|gray| self.z(gray.0[0]))
+    }
+    /// Depth z of a pixel [m].
+    pub(super) fn depth(&self, column: u32, row: u32) -> f64 {
+        self.z(self.depths.get_pixel(column, row).0[0])
+    }
+    fn z(&self, gray: u16) -> f64 {
+        let gray = f64::from(gray) / 65535.0;
+        let part = if self.scale == DepthScale::WhiteNear { 1.0 - gray } else { gray };
+        self.ends[0] + part * (self.ends[1] - self.ends[0])
+    }
+}
+
+/// Writes depths z [m] as a depth map of 16-bit gray, linear between `near` and `far`; what lies beyond takes their gray,
+/// a pixel without depth the farthest.
+///
+/// # Errors
+/// [`Error::Io`] where the file cannot be written.
+pub fn write_depths(
+    path: &Path,
+    [width, height]: [u32; 2],
+    depths: &[Option<f64>],
+    scale: DepthScale,
+    [near, far]: [f64; 2],
+) -> Result<()> {
+    let gray = |z: &Option<f64>| {
+        let part = z.map_or(1.0, |z| ((z - near) / (far - near)).clamp(0.0, 1.0));
+        let part = if scale == DepthScale::WhiteNear { 1.0 - part } else { part };
+        ((part * 65535.0).round() as u16).to_be_bytes()
+    };
+    let bytes: Vec<u8> = depths.iter().flat_map(gray).collect();
+    let refused = |e: png::EncodingError| match e {
+        png::EncodingError::IoError(source) => Error::Io { path: path.into(), source },
+        other => Error::input(path, other.to_string()),
+    };
+    files::write_whole(path, |out| {
+        let mut encoder = png::Encoder::new(out, width, height);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        let end = if scale == DepthScale::WhiteNear { "white" } else { "black" };
+        let text = format!("depth map: z from {near} m ({end}) to {far} m, linear, negative behind the panel");
+        encoder.add_itxt_chunk("Description".into(), text).map_err(refused)?;
+        let mut writer = encoder.write_header().map_err(refused)?;
+        writer.write_image_data(&bytes).map_err(refused)?;
+        writer.finish().map_err(refused)
+    })
+}
+
+/// Reads a picture and its depth map into points.
 ///
 /// The picture fills the viewing window of a [`Placement::Window`]; depth runs linearly in gray between its `near` and
 /// `far`. Black pixels make no point. Phases are random under `seed`, or all zero without one.
 ///
 /// # Errors
-/// [`Error::Input`] for files that are not pictures or differ in size; [`Error::Parameter`] for a model placement.
+/// Those of [`RgbDepth::read`] and [`Window::new`]; [`Error::Input`] for a picture that is black.
 pub fn read(
     rgb: &Path,
     depth: &Path,
@@ -34,45 +163,22 @@ pub fn read(
     seed: Option<u64>,
     panel: &Grid,
 ) -> Result<PointCloud> {
-    let Placement::Window { eye, near, far } = *placement else {
-        return Err(Error::parameter("placement", "a picture with depth has no scene to make a model of; use window"));
-    };
-    if !(eye > 0.0 && eye > near && far <= near) {
-        return Err(Error::parameter("near/far", format!("eye {eye} m, near {near} m, far {far} m are not in order")));
-    }
-    let open = |path: &Path| -> Result<image::DynamicImage> {
-        if !path.is_file() {
-            let missing = std::io::Error::from(std::io::ErrorKind::NotFound);
-            return Err(Error::Io { path: path.into(), source: missing });
-        }
-        image::open(path).map_err(|e| Error::input(path, format!("not a picture that can be read: {e}")))
-    };
-    let picture = open(rgb)?.into_rgb16();
-    let depths = open(depth)?.into_luma16();
-    if picture.dimensions() != depths.dimensions() {
-        let ((w, h), (dw, dh)) = (picture.dimensions(), depths.dimensions());
-        let what = format!("{dw}×{dh} pixels, but {} has {w}×{h}; they must be equal", rgb.display());
-        return Err(Error::input(depth, what));
-    }
-    let (width, height) = (picture.width() as f64, picture.height() as f64);
-    let half_height = 0.5 * panel.extent_y().min(panel.extent_x() * height / width);
-    let half_width = half_height * width / height;
+    let read = RgbDepth::read(rgb, depth, scale, placement)?;
+    let window = Window::new(placement, read.size(), panel)?;
+    let [width, height] = read.size().map(f64::from);
     let mut cloud = PointCloud { points: Vec::new(), rgb: Some(Vec::new()) };
     let amplitudes = cloud.rgb.get_or_insert_default();
-    for (pixel, (color, gray)) in picture.pixels().zip(depths.pixels()).enumerate() {
+    for (pixel, (color, z)) in read.picture.pixels().zip(read.depths()).enumerate() {
         let radiance = color.0.map(|c| linear_from_srgb(f32::from(c) / 65535.0));
         if radiance == [0.0; 3] {
             continue;
         }
-        let (column, row) = (pixel as u32 % picture.width(), pixel as u32 / picture.width());
-        let gray = f64::from(gray.0[0]) / 65535.0;
-        let part = if scale == DepthScale::WhiteNear { 1.0 - gray } else { gray };
-        let z = near + part * (far - near);
-        let spread = (eye - z) / eye;
-        let x = ((f64::from(column) + 0.5) / width * 2.0 - 1.0) * half_width * spread;
-        let y = (1.0 - (f64::from(row) + 0.5) / height * 2.0) * half_height * spread;
+        let (column, row) = (pixel as u32 % read.size()[0], pixel as u32 / read.size()[0]);
+        let spread = window.spread(z);
+        let x = ((f64::from(column) + 0.5) / width * 2.0 - 1.0) * window.half[0] * spread;
+        let y = (1.0 - (f64::from(row) + 0.5) / height * 2.0) * window.half[1] * spread;
         let position = DVec3::new(x, y, z);
-        let distance = (DVec3::new(0.0, 0.0, eye) - position).length();
+        let distance = (DVec3::new(0.0, 0.0, window.eye) - position).length();
         let amplitude = |l: f32| (f64::from(l).sqrt() * distance) as f32;
         let phase = seed.map_or(0.0, |seed| Random::new(seed, pixel as u64).phase());
         cloud.points.push(PointSource { position, amplitude: amplitude(luminance(radiance)), phase });

@@ -11,6 +11,7 @@ pub mod images;
 mod odd_tests;
 pub mod placement;
 pub mod ply;
+pub mod slices;
 pub mod trace;
 mod wavefront;
 

@@ -20,10 +20,10 @@
 
 use super::{Aperture, Settings, turned, turns_and_decay};
 use crate::error::{Error, Result};
-use crate::field::{Complex, Field, Grid};
+use crate::field::{Complex, Field, Grid, plans};
 use crate::progress::Progress;
 use rayon::prelude::*;
-use rustfft::{Fft, FftNum, FftPlanner};
+use rustfft::{Fft, FftNum};
 use std::sync::Arc;
 
 /// Columns or rows that one task takes together.
@@ -78,8 +78,7 @@ impl<T: FftNum> ScaledPropagator<T> {
                     (least..).find(|&n| smooth(n)).unwrap_or(least)
                 },
             );
-        let mut planner = FftPlanner::new();
-        let forward = counts.map(|n| planner.plan_fft_forward(n));
+        let forward = counts.map(|n| plans(n)[0].clone());
         let planned = Self { input, output, wavelength, distance, settings, counts, forward };
         let needed = planned.memory();
         if needed > settings.memory {
@@ -303,8 +302,7 @@ impl<T: FftNum> Chirp<T> {
     fn new(range: &Range, m: usize, alpha: f64, scale: f64) -> Self {
         let least = range.count + m;
         let length = (least..).find(|&n| smooth(n)).unwrap_or(least);
-        let mut planner = FftPlanner::new();
-        let plans = [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)];
+        let plans = plans(length);
         // d² reaches 1e9 and α is below one: the product is exact to 1e-7 turns in f64 before it is reduced.
         let wave = |index: i64, sign: f64, scale: f64| {
             let square = (index as f64) * (index as f64);

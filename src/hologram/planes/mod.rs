@@ -306,7 +306,7 @@ pub(crate) fn field(
     let table = |axis| Table::new(optics, axis, h, parameters.tail, parameters.table, progress);
     let first = table(0);
     let second = (!same).then(|| table(1));
-    let tables = [&first, second.as_ref().unwrap_or(&first)];
+    let tables: [&Table; 2] = [&first, second.as_deref().unwrap_or(&first)];
     progress.check()?;
     let lambda = optics.wavelength;
     // The kernels carry exp(i2πd(α − ᾱ)) of each axis: the rest of d·f_z is the point's phase.

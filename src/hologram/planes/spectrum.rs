@@ -14,12 +14,12 @@
 use super::slabs::legendre;
 use super::table::mean_square;
 use crate::error::Result;
-use crate::field::{Complex32, Field, Grid, zeroed};
+use crate::field::{Complex32, Field, Grid, plans, zeroed};
 use crate::hologram::definition::Optics;
 use crate::hologram::lanes::{Aligned, InstructionSet, Lanes, cos_sin, dispatch};
 use crate::progress::Progress;
 use rayon::prelude::*;
-use rustfft::{Fft, FftPlanner};
+use rustfft::Fft;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -83,9 +83,7 @@ impl Spectrum {
     /// A dark one; `depth` is h [m].
     pub(super) fn new(optics: &Optics, layout: &Layout, depth: f64, set: InstructionSet) -> Self {
         let [width, height] = layout.size;
-        let mut planner = FftPlanner::<f32>::new();
-        let rows = [planner.plan_fft_forward(width), planner.plan_fft_inverse(width)];
-        let columns = [planner.plan_fft_forward(height), planner.plan_fft_inverse(height)];
+        let (rows, columns) = (plans(width), plans(height));
         let lambda = optics.wavelength;
         let square = |axis: usize, k: usize| {
             let n = layout.size[axis];

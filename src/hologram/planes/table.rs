@@ -9,13 +9,13 @@
 //! separable fit of f_z − 1/λ: the product of two such kernels is the point's band-limited wave but for the residual
 //! that the spectrum corrects ([`super::spectrum`]).
 
-use crate::field::Complex64;
+use crate::field::{Complex64, plans};
 use crate::hologram::definition::Optics;
 use crate::hologram::lanes::{Aligned, Lanes};
 use crate::progress::Progress;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 use std::f64::consts::TAU;
+use std::sync::{Arc, Mutex};
 
 /// Zeros on both sides of a row, so that a vector may start before it and end behind it.
 const PAD: usize = 16;
@@ -58,6 +58,19 @@ pub(super) fn mean_square(optics: &Optics, axis: usize) -> f64 {
     optics.taper[axis].middle.powi(2) / 3.0
 }
 
+/// What a table is made from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Key {
+    optics: Optics,
+    axis: usize,
+    depth: f64,
+    tail: f64,
+    fineness: Fineness,
+}
+
+/// Tables that are kept for the next computation: two axes' for the fine and the coarse pass of a live view.
+const KEPT: usize = 4;
+
 /// Kernels of one axis.
 #[derive(Debug)]
 pub(super) struct Table {
@@ -90,6 +103,8 @@ impl Table {
     }
 
     /// Kernels for |d| ≤ `depth`, `tail` pixels beyond the cone; unspecified when asked to stop.
+    ///
+    /// The last few tables are kept, so that a fixed geometry (live viewing, animation, iterations) has its own at once.
     pub(super) fn new(
         optics: &Optics,
         axis: usize,
@@ -97,7 +112,26 @@ impl Table {
         tail: f64,
         fineness: Fineness,
         progress: &Progress,
-    ) -> Self {
+    ) -> Arc<Self> {
+        static TABLES: Mutex<Vec<(Key, Arc<Table>)>> = Mutex::new(Vec::new());
+        let key = Key { optics: *optics, axis, depth, tail, fineness };
+        // A thread that panicked left whole tables behind.
+        let kept = || TABLES.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some((_, table)) = kept().iter().find(|(known, _)| *known == key) {
+            return Arc::clone(table);
+        }
+        let table = Arc::new(Self::build(optics, axis, depth, tail, fineness, progress));
+        if !progress.stopped() {
+            let mut kept = kept();
+            if kept.len() == KEPT {
+                kept.remove(0);
+            }
+            kept.push((key, Arc::clone(&table)));
+        }
+        table
+    }
+
+    fn build(optics: &Optics, axis: usize, depth: f64, tail: f64, fineness: Fineness, progress: &Progress) -> Self {
         let (step, levels) = Self::levels(optics, axis, depth, fineness);
         let phases = fineness.phases();
         let half = Self::half_width(optics, axis, depth, tail);
@@ -123,7 +157,7 @@ impl Table {
                 (k.rem_euclid(count as isize) as usize, weight, alpha(optics, axis, f) - mean)
             })
             .collect();
-        let plan = FftPlanner::<f64>::new().plan_fft_inverse(count);
+        let [_, plan] = plans::<f64>(count);
         let mut values = Aligned::default();
         values.reserve(levels * (phases + 1) * 2 * row);
         let level_values = (phases + 1) * 2 * row;
