@@ -45,19 +45,39 @@ pub(crate) enum Command {
         after_help = "Example:\n  holodrive propagate field.npy --pitch 8um --wavelength 532nm --distance 0.5m -o out.npy"
     )]
     Propagate(PropagateArgs),
-    /// Encode a field as a frame of drive levels for a panel.
-    #[command(after_help = "Example:\n  holodrive encode field.npy --method double-phase -o frame.png")]
+    /// Encode a field, or a picture at depths, as a frame of drive levels for a panel.
+    #[command(
+        after_help = "Examples:\n  holodrive encode field.npy --method double-phase -o frame.png\n  holodrive encode field.npy --method double-phase --blaze 0.6deg --lens 300mm -o frame.png\n  holodrive encode picture.png --method weighted --depths 100mm -o frame.png\n  holodrive encode rgb.png+depth.png --method plane-gradient --depths 100mm,120mm,150mm -o frame.png"
+    )]
     Encode(EncodeArgs),
     /// Reconstruct what is seen of a frame or a field: on a plane, or through an eye.
     #[command(
-        after_help = "Examples:\n  holodrive reconstruct frame.png --distance 120mm -o near.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus 150mm --pupil 4mm -o eye.png"
+        after_help = "Examples:\n  holodrive reconstruct frame.png --distance 120mm -o near.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus 150mm --pupil 4mm -o eye.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus 150mm --views 5x1 --eye-box 20mm -o eye.png"
     )]
     Reconstruct(ReconstructArgs),
     /// The whole way: scene, points, field or frame → pictures on the simulated panel, or light on a real one.
     #[command(
         after_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show scenes/cornell.gltf --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO"
     )]
-    Show(ShowArgs),
+    Show(Box<ShowArgs>),
+    /// Find a panel's curve and bend: frames to show, and what the measured numbers say.
+    #[command(
+        after_help = "Examples:\n  holodrive calibrate curve -o sweep\n  holodrive calibrate curve --powers sweep/manifest.csv -o mine.toml\n  holodrive calibrate flatness --zernike 0,0,0,0.8 --radius 6mm -o flat.npy --into mine.toml\n  holodrive calibrate check --panel mine.toml -o cards"
+    )]
+    Calibrate {
+        /// What to find.
+        #[command(subcommand)]
+        what: super::calibrate::CalibrateCommand,
+    },
+    /// Compare what this program offers, on the simulated panel.
+    #[command(
+        after_help = "Examples:\n  holodrive bench encodings\n  holodrive bench encodings --size 96x72 --iterations 20 --json"
+    )]
+    Bench {
+        /// What to compare.
+        #[command(subcommand)]
+        what: super::bench::BenchCommand,
+    },
     /// List the monitors, and which panel profile fits each.
     Monitors(MonitorsArgs),
     /// Look at everything on this desktop that alters levels on their way to a panel.
@@ -217,15 +237,55 @@ pub(crate) struct EncodingArgs {
     /// Off-axis: angle of the reference wave, x or x,y.
     #[arg(long, value_parser = angles, value_name = "ANGLE[,ANGLE]", allow_hyphen_values = true)]
     pub(crate) reference_angle: Option<[f64; 2]>,
+    /// Wavefront correction (.npy of radians, .bmp or .png of a vendor, Santec's .csv), or `none` [default: the profile's].
+    #[arg(long, value_name = "FILE")]
+    pub(crate) correction: Option<String>,
+    /// Depths at which plane-gradient, gerchberg-saxton, weighted and double-constraint put the picture, from the panel,
+    /// signed as reconstruct's --distance [default: three over the content's depth].
+    #[arg(long, value_name = "LENGTH,…", value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) depths: Vec<String>,
+    /// Iterations of gradient and of the methods with depths.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=100_000), value_name = "N")]
+    pub(crate) iterations: Option<u64>,
+    /// First phases of the methods with depths.
+    #[arg(long, value_enum, value_name = "PHASES")]
+    pub(crate) start: Option<StartArg>,
+    /// Carrier: in straight light the object goes aside by this angle, off the zero order; x or x,y.
+    #[arg(long, value_parser = angles, value_name = "ANGLE[,ANGLE]", allow_hyphen_values = true)]
+    pub(crate) blaze: Option<[f64; 2]>,
+    /// Digital lens: the pattern focuses the light by this focal length.
+    #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) lens: Option<f64>,
+    /// Keep the object's light out of this angle about the axis, where a stop for the zero order stands.
+    #[arg(long, value_parser = units::angle, value_name = "ANGLE")]
+    pub(crate) band_stop: Option<f64>,
+}
+
+/// First phases of an iteration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum StartArg {
+    /// The field's own.
+    Field,
+    /// The same everywhere.
+    Constant,
+    /// Random: speckle.
+    Random,
+    /// A lens: no speckle.
+    Quadratic,
+    /// Random, changing smoothly.
+    Smooth,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct EncodeArgs {
-    /// The field (.npy).
+    /// The field (.npy), or a picture (.png, .bmp; with its depth map: rgb.png+depth.png).
     pub(crate) input: PathBuf,
     /// The frame to write.
     #[arg(short, long, default_value = "frame.png", value_name = "FILE")]
     pub(crate) output: PathBuf,
+    /// Part of the panel's sides that a picture takes; the light beside it is free.
+    #[arg(long, default_value_t = 0.75, value_name = "SHARE")]
+    pub(crate) window: f64,
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
     #[command(flatten)]
@@ -279,6 +339,18 @@ pub(crate) struct ReconstructArgs {
     /// Samples per pixel and side of the simulated panel: 1, or more to see replica orders.
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub(crate) subpixels: usize,
+    /// Fault of the simulated panel: phases of neighbouring pixels blend by a Gaussian of so many pixels.
+    #[arg(long, default_value_t = 0.0, value_name = "PIXELS")]
+    pub(crate) crosstalk: f64,
+    /// Fault of the simulated panel: its bend, as a file like those of encode's --correction.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) bend: Option<PathBuf>,
+    /// With --eye: a picture from each of so many places, beside each other × one above the other; names get -column-row.
+    #[arg(long, value_parser = size, value_name = "CxR", requires = "eye", requires = "eye_box")]
+    pub(crate) views: Option<(usize, usize)>,
+    /// Width and height over which --views moves the eye.
+    #[arg(long, value_parser = pitch, value_name = "LENGTH[,LENGTH]", requires = "views")]
+    pub(crate) eye_box: Option<[f64; 2]>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -307,6 +379,12 @@ pub(crate) struct ShowArgs {
     /// Show the frame even where a gamma table (night light) alters its levels; the report says what does.
     #[arg(long)]
     pub(crate) allow_altered_levels: bool,
+    /// Encode so many sub-frames with phases of their own; shown faster than an eye sees, their speckle averages out.
+    #[arg(long, default_value_t = 1, value_name = "N", conflicts_with = "wavelengths")]
+    pub(crate) subframes: usize,
+    /// Sub-frames share out the points instead of showing all.
+    #[arg(long, requires = "subframes")]
+    pub(crate) sparse: bool,
     /// What brings the levels to the screen.
     #[arg(long, value_enum, default_value_t = PresenterArg::Auto)]
     pub(crate) present: PresenterArg,

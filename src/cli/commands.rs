@@ -1,27 +1,23 @@
 //! The steps, one by one.
 
-use super::args::{
-    ComputeArgs, EncodeArgs, EncodingArgs, FrameArg, KernelArg, PointsArgs, PropagateArgs, ReconstructArgs, White,
-};
+use super::args::{ComputeArgs, FrameArg, KernelArg, PointsArgs, PropagateArgs, ReconstructArgs, White};
 use super::bar::Bar;
 use super::colour;
 use super::layers;
 use super::light::report_gamut;
 use super::load::{
-    Input, Panel, channel, depth_scale, hologram_settings, input, load_points, panel, panel_in_color, placed_by,
+    Input, channel, depth_scale, hologram_settings, input, load_points, panel_in_color, placed_by,
 };
 use super::report::{Report, seconds};
 use glam::DVec2;
-use holodrive::encode::{EncodeSettings, Encoding, Reference};
 use holodrive::field::{Field, npy};
 use holodrive::hologram::Computed;
 use holodrive::panel::simulated::Simulation;
-use holodrive::panel::{Frame, Modulation, Origin, PanelProfile};
+use holodrive::panel::{Faults, Frame, PanelProfile, wavefront};
 use holodrive::pipeline::{self, Lit};
 use holodrive::points::{Placement, PointCloud, images, ply};
-use holodrive::progress::Progress;
 use holodrive::propagation::{self, Kernel, Propagator};
-use holodrive::reconstruction::{self, Picture, Scale, View, ViewSettings, write_rgb_png};
+use holodrive::reconstruction::{self, Picture, Scale, View, ViewSettings, orders, write_rgb_png};
 use holodrive::units::{self, show_length};
 use holodrive::{Error, Result};
 use std::path::Path;
@@ -174,84 +170,8 @@ pub(super) fn propagate(args: &PropagateArgs) -> Result<Report> {
     Ok(report)
 }
 
-/// Encoding settings for a kind of panel.
-pub(super) fn encode_settings(args: &EncodingArgs, panel: &Panel) -> Result<EncodeSettings> {
-    let chosen = args.encoding.as_deref().unwrap_or(match panel.profile.modulation() {
-        Modulation::Amplitude => "off-axis-bipolar",
-        Modulation::Phase => "double-phase",
-    });
-    let mut encoding = Encoding::named(chosen)?;
-    if let Some(angles) = args.reference_angle {
-        match &mut encoding {
-            Encoding::OffAxisBipolar(fringe) | Encoding::OffAxisIntensity(fringe) => {
-                fringe.reference = Some(Reference::Angle(angles));
-            }
-            Encoding::Binary(binary) => binary.fringe.reference = Some(Reference::Angle(angles)),
-            _ => {
-                let what = format!("{chosen} has no reference wave to turn; leave --reference-angle out");
-                return Err(Error::parameter("reference-angle", what));
-            }
-        }
-    }
-    Ok(EncodeSettings::new(encoding))
-}
-
-/// A field as a frame, with its time.
-pub(super) fn encode_field(
-    field: &Field,
-    args: &EncodingArgs,
-    panel: &Panel,
-    origin: &Origin,
-    progress: &Progress,
-    report: &mut Report,
-) -> Result<Frame> {
-    let begin = Instant::now();
-    let settings = encode_settings(args, panel)?;
-    let mut encoded = pipeline::frame(field, &panel.profile, &settings, progress)?;
-    encoded.frame.metadata.origin = origin.clone();
-    let (elapsed, did) = (begin.elapsed().as_secs_f64(), &encoded.report);
-    report.warn(did.warnings.iter());
-    report.add("encoding", did.method, "");
-    report.add("efficiency", did.efficiency, "");
-    report.add("encoding_field_error", did.field_error, "");
-    report.add("clipped", did.clipped, "");
-    report.add("dropped", did.dropped, "");
-    report.add("quantisation_error", did.quantisation_error, "");
-    report.add("unreachable", did.unreachable, "");
-    report.add(
-        "encode_seconds",
-        elapsed,
-        format!(
-            "encode       {:>8}  {}: efficiency {:.2} %, field error {:.3} in its band, {:.1} % of the light outside the band dropped",
-            seconds(elapsed),
-            did.method,
-            100.0 * did.efficiency,
-            did.field_error,
-            100.0 * did.dropped
-        ),
-    );
-    Ok(encoded.frame)
-}
-
-pub(super) fn encode(args: &EncodeArgs) -> Result<Report> {
-    let mut report = Report::new("encode");
-    let panel = panel(&args.panel, &mut report)?;
-    let pitch = [panel.grid.pitch_x, panel.grid.pitch_y];
-    let beside = npy::read_metadata(&args.input)?;
-    let wavelength = args.panel.wavelength.or(beside.as_ref().map(|m| m.wavelength)).unwrap_or(panel.wavelength);
-    let (field, metadata) = npy::read_field(&args.input, Some(pitch), Some(wavelength))?;
-    let bar = Bar::new();
-    let origin =
-        Origin { source: Some(args.input.display().to_string()), depth: metadata.content.depth, ..Origin::default() };
-    let frame = encode_field(&field, &args.encoding, &panel, &origin, &bar.progress, &mut report)?;
-    bar.progress.check()?;
-    frame.write(&args.output)?;
-    report.add("output", args.output.display().to_string(), format!("frame        {}", args.output.display()));
-    Ok(report)
-}
-
 /// A depth as it was typed: signed is z, unsigned lies on the side of the content.
-fn depth(text: &str, content: Option<[f64; 2]>) -> Result<f64> {
+pub(super) fn depth(text: &str, content: Option<[f64; 2]>) -> Result<f64> {
     let value = units::length(text)?;
     let signed = text.trim_start().starts_with(['+', '-']);
     let behind = content.is_some_and(|[near, far]| near + far < 0.0);
@@ -277,9 +197,22 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
             let profile = args.panel.as_deref().map(PanelProfile::find).transpose()?;
             let (frame, warnings) = Frame::read(&path, profile.as_ref(), args.wavelength)?;
             report.warn(warnings);
-            let simulation = Simulation { subsamples: args.subpixels, ..Simulation::default() };
+            let bend = args.bend.as_deref().map(|path| wavefront::read(path, None)).transpose()?;
+            let faults = Faults { crosstalk: args.crosstalk, bend, ..Faults::default() };
+            let simulation = Simulation { subsamples: args.subpixels, faults, ..Simulation::default() };
             let (field, mut settings) = pipeline::simulated_light(&frame, &simulation, &bar.progress)?;
             settings.block_zero_order(args.zero_order_stop, field.wavelength);
+            if let Some(encoding) = &frame.metadata.encoding {
+                let light = orders(&field, encoding);
+                let line = format!(
+                    "light        {:.1} % object, {:.1} % zero order, {:.1} % conjugate, {:.1} % elsewhere (simulated)",
+                    100.0 * light.object,
+                    100.0 * light.zero,
+                    100.0 * light.conjugate,
+                    100.0 * light.rest
+                );
+                report.add_serialised("orders", &light, line);
+            }
             let content = npy::Content { depth: frame.metadata.origin.depth, ..npy::Content::default() };
             (field, settings, content)
         }
@@ -295,6 +228,9 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
     };
     let half = args.half.map_or_else(|| seen_half(&field, &view, content.eye), |[x, y]| DVec2::new(x, y));
     let begin = Instant::now();
+    if let (Some(views), Some(eye_box)) = (args.views, args.eye_box) {
+        return super::parallax::views(args, (&field, &settings), &view, half, (views, eye_box), &bar.progress, report);
+    }
     bar.progress.start("reconstruct", 0);
     let picture = match args.size {
         Some(size) => reconstruction::picture(&field, &view, half, size, &settings, &bar.progress)?,

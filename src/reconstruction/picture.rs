@@ -57,6 +57,20 @@ impl Picture {
         Self { width, height, values: sums.into_iter().map(|v| v as f32).collect() }
     }
 
+    /// The mean of pictures of one size: what a slow eye sees of frames shown one after another. None of none.
+    ///
+    /// # Panics
+    /// When their sizes differ.
+    pub fn mean(pictures: &[Self]) -> Option<Self> {
+        let first = pictures.first()?;
+        let mut values = vec![0.0; first.values.len()];
+        for picture in pictures {
+            assert!((picture.width, picture.height) == (first.width, first.height), "pictures of one size");
+            values.iter_mut().zip(&picture.values).for_each(|(sum, v)| *sum += v / pictures.len() as f32);
+        }
+        Some(Self { values, ..*first })
+    }
+
     /// The value shown as white.
     pub fn white(&self, scale: Scale) -> f32 {
         match scale {
@@ -136,6 +150,25 @@ fn write_png(
         writer.write_image_data(bytes).map_err(refused)?;
         writer.finish().map_err(refused)
     })
+}
+
+/// Reads a gray (or the luminance of a colour) picture of 8 or 16 bits as it is stored, 0 … 1: columns, rows, values.
+///
+/// # Errors
+/// [`Error::Input`] for a file that is no picture, or one of more than 2²⁸ pixels.
+pub fn read_gray(path: &Path) -> Result<(usize, usize, Vec<f32>)> {
+    let refused = |e: image::ImageError| Error::input(path, format!("not a readable picture: {e}"));
+    let reader =
+        image::ImageReader::open(path).map_err(Error::io(path))?.with_guessed_format().map_err(Error::io(path))?;
+    let (width, height) = reader.into_dimensions().map_err(refused)?;
+    if u64::from(width) * u64::from(height) > 1 << 28 {
+        return Err(Error::input(path, format!("{width}×{height} pixels are too many")));
+    }
+    let reader =
+        image::ImageReader::open(path).map_err(Error::io(path))?.with_guessed_format().map_err(Error::io(path))?;
+    let gray = reader.decode().map_err(refused)?.into_luma16();
+    let values = gray.into_raw().into_iter().map(|v| f32::from(v) / 65535.0).collect();
+    Ok((width as usize, height as usize, values))
 }
 
 /// For each sample, which cells of ±half it touches and with what share of its pixel.

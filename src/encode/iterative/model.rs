@@ -1,0 +1,154 @@
+//! The panel inside the loop: what light a wished phase becomes, with the levels, the curve, the range, the dead space, the
+//! crosstalk and the wave that falls on it.
+
+use crate::error::{Error, Result};
+use crate::field::{Complex32, Complex64, Grid};
+use crate::panel::simulated::{blurred, illuminate};
+use crate::panel::{DriveCurve, Illumination, Modulation, PanelProfile};
+use rayon::prelude::*;
+use std::f32::consts::TAU;
+
+/// A phase panel as an iteration sees it.
+pub(super) struct PanelModel {
+    pub(super) grid: Grid,
+    /// For a wish in each of the bins of one turn: the phase that the panel shows, unwrapped as its curve has it, and its
+    /// phasor times the fill factor.
+    shown: Vec<(f32, Complex32)>,
+    fill: f32,
+    /// Standard deviation of the Gaussian that blends neighbouring pixels' phases [pixels].
+    crosstalk: f64,
+    /// Light of the dead space, seen along the axis: (1 − F)·d.
+    dead: f32,
+    /// The wave that falls on each pixel; absent: 1 everywhere.
+    incident: Option<Vec<Complex32>>,
+    /// Ends between which the panel can move, where it has less than a turn.
+    pub(super) range: Option<Range>,
+}
+
+/// Light of all pixels.
+pub(super) struct Light {
+    /// All of it.
+    pub(super) total: Vec<Complex32>,
+    /// What turns with the pixels' phases: all but the dead space's.
+    pub(super) modulated: Vec<Complex32>,
+}
+
+/// Phases between which a panel of less than a turn can move [rad].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Range {
+    pub(super) low: f32,
+    pub(super) high: f32,
+}
+
+impl Range {
+    /// The same phase on the circle within the range, or the nearer end.
+    pub(super) fn nearest(self, phase: f32) -> f32 {
+        let above = self.low + (phase - self.low).rem_euclid(TAU);
+        if above <= self.high {
+            return above;
+        }
+        if above - self.high < self.low + TAU - above { self.high } else { self.low }
+    }
+}
+
+impl PanelModel {
+    /// Bins a turn: a wish within half a bin of the border between two levels may get either, both equally good to 2e-4.
+    const BINS: usize = 1 << 14;
+
+    pub(super) fn new(profile: &PanelProfile, wavelength: f64, illumination: Illumination) -> Result<Self> {
+        if profile.modulation() != Modulation::Phase {
+            let what = format!("{} modulates amplitude; the iterations here need a phase panel", profile.name);
+            return Err(Error::parameter("panel", what));
+        }
+        let grid = profile.grid()?;
+        let curve = profile.drive_curve(wavelength)?.0;
+        let fill = profile.fill_factor;
+        let shown = (0..Self::BINS)
+            .map(|bin| {
+                let wish = (bin as f64 + 0.5) / Self::BINS as f64 * std::f64::consts::TAU;
+                let level = curve.nearest(wish).0;
+                let phasor: Complex64 = curve.phasor(level) * fill;
+                let phase = curve.values()[usize::from(level)];
+                (phase as f32, Complex32::new(phasor.re as f32, phasor.im as f32))
+            })
+            .collect();
+        let incident = match illumination {
+            Illumination::Normal => None,
+            other => {
+                let mut wave = vec![Complex32::new(1.0, 0.0); grid.len()];
+                illuminate(&mut wave, grid, wavelength, other)?;
+                Some(wave)
+            }
+        };
+        let dead = ((1.0 - fill) * profile.dead_space) as f32;
+        let (fill, crosstalk) = (fill as f32, profile.crosstalk);
+        Ok(Self { grid, shown, fill, crosstalk, dead, incident, range: range(&curve) })
+    }
+
+    /// Phase that the panel shows for a wished phase [rad], as its curve counts it, with its phasor times the fill factor.
+    pub(super) fn show(&self, wish: f32) -> (f32, Complex32) {
+        let turn = wish * (1.0 / TAU);
+        let bin = ((turn - turn.floor()) * Self::BINS as f32) as usize;
+        self.shown[bin.min(Self::BINS - 1)]
+    }
+
+    /// The light of a panel with these wishes.
+    pub(super) fn light(&self, wishes: &[f32]) -> Light {
+        let one = Complex32::new(1.0, 0.0);
+        let lit = |i: usize, phasor: Complex32| {
+            let incident = self.incident.as_ref().map_or(one, |wave| wave[i]);
+            let modulated = phasor * incident;
+            (modulated + incident * self.dead, modulated)
+        };
+        let (total, modulated) = if self.crosstalk > 0.0 {
+            let phases: Vec<f32> = wishes.par_iter().map(|&wish| self.show(wish).0).collect();
+            let phases = blurred(&phases, self.grid.width, self.crosstalk);
+            phases.par_iter().enumerate().map(|(i, &p)| lit(i, Complex32::from_polar(self.fill, p))).unzip()
+        } else {
+            wishes.par_iter().enumerate().map(|(i, &wish)| lit(i, self.show(wish).1)).unzip()
+        };
+        Light { total, modulated }
+    }
+
+    /// Slopes of what the panel shows as slopes of its pixels' wishes: crosstalk spreads each over its neighbours.
+    pub(super) fn pulled_back(&self, slopes: Vec<f32>) -> Vec<f32> {
+        if self.crosstalk > 0.0 { blurred(&slopes, self.grid.width, self.crosstalk) } else { slopes }
+    }
+
+    /// The wish of pixel `i` whose light comes nearest to a wished light of any modulus, from the wish that it has and the
+    /// light that this gives.
+    ///
+    /// With crosstalk no wish has its own light; it moves by as much as its light should turn.
+    pub(super) fn wish(&self, i: usize, light: Complex32, before: f32, modulated: Complex32) -> f32 {
+        let wished = match &self.incident {
+            None => light - self.dead,
+            Some(wave) => light * wave[i].conj() - self.dead * wave[i].norm_sqr(),
+        };
+        if self.crosstalk == 0.0 {
+            return wished.im.atan2(wished.re);
+        }
+        let shown = self.incident.as_ref().map_or(modulated, |wave| modulated * wave[i].conj());
+        let turn = wished * shown.conj();
+        // Where the panel has no more range the wish must not run away.
+        let moved = before + turn.im.atan2(turn.re);
+        self.range.map_or(moved, |range| range.nearest(moved))
+    }
+
+    /// Phases of a panel in normal light turned into those that make the same light of the incident wave.
+    pub(super) fn lit(&self, phases: &mut [f32]) {
+        if let Some(wave) = &self.incident {
+            phases.par_iter_mut().zip(wave).for_each(|(phase, wave)| *phase -= wave.im.atan2(wave.re));
+        }
+        if let Some(range) = self.range {
+            phases.par_iter_mut().for_each(|phase| *phase = range.nearest(*phase));
+        }
+    }
+}
+
+/// The range of a panel whose phases leave a gap on the circle, wider than eight steps of its levels.
+fn range(curve: &DriveCurve) -> Option<Range> {
+    let span = curve.range();
+    let step = span / (curve.levels().max(2) - 1) as f64;
+    let low = curve.values().iter().fold(f64::INFINITY, |low, &v| low.min(v));
+    (std::f64::consts::TAU - span > 8.0 * step).then_some(Range { low: low as f32, high: (low + span) as f32 })
+}
