@@ -52,8 +52,9 @@
 //! 13. [`encode`]: field to phase or fringes for a panel's levels and range
 //! 14. [`reconstruction`]: field to pictures, gray or in three lasers' colours, and how good they are
 //! 15. [`pipeline`]: the whole way, on one screen
-//! 16. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols
-//! 17. [`display`]: monitors and the fullscreen window (feature `display`)
+//! 16. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
+//! 17. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols
+//! 18. [`display`]: monitors and the fullscreen window (feature `display`)
 
 #[cfg(feature = "display")]
 pub mod display;
@@ -66,6 +67,7 @@ pub mod illumination;
 pub mod panel;
 pub mod pipeline;
 pub mod points;
+pub mod print;
 pub mod progress;
 pub mod propagation;
 pub mod random;

@@ -7,6 +7,8 @@ mod commands;
 mod light;
 mod load;
 mod monitors;
+mod print;
+mod print_args;
 mod report;
 mod scene_args;
 #[cfg(feature = "display")]
@@ -41,6 +43,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Encode(args) => commands::encode(&args),
         Command::Reconstruct(args) => commands::reconstruct(&args),
         Command::Show(args) => show::show(&args),
+        Command::Print(args) => print::print(&args, json),
         Command::Monitors(args) => monitors::monitors(&args),
         Command::Doctor(args) => monitors::doctor(&args),
     };
@@ -60,7 +63,7 @@ fn one_line(refused: &clap::Error) -> String {
     let words = first.join(" ");
     let words = words.strip_prefix("error: ").unwrap_or(&words);
     if refused.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return "holodrive: a command is needed: points, compute, propagate, encode, reconstruct, show, monitors or doctor (see holodrive --help)".into();
+        return "holodrive: a command is needed: points, compute, propagate, encode, reconstruct, show, print, monitors or doctor (see holodrive --help)".into();
     }
     format!("holodrive: {words} (see holodrive --help)")
 }

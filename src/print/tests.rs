@@ -1,0 +1,1 @@
+//! Tiles against an oracle, seams, previews.
