@@ -284,11 +284,14 @@ fn look(args: &PreviewArgs) -> Result<Report> {
     let focus = units::length(&args.focus)?;
     let signed = args.focus.trim_start().starts_with(['+', '-']);
     let focus = if !signed && plate.place < 0.0 { -focus } else { focus };
+    let [_, _, columns, rows] = args.part.unwrap_or([0, 0, plate.width, plate.height]);
+    let (wide, tall) = (columns as f64 * plate.pitch_x, rows as f64 * plate.pitch_y);
+    let side = |length: f64| ((400.0 * length / wide.max(tall)).round() as usize).max(1);
     let settings = PreviewSettings {
         eye: args.eye,
         pupil: args.pupil,
         focus,
-        size: args.size,
+        size: args.size.unwrap_or((side(wide), side(tall))),
         part: args.part,
         memory: args.memory,
     };

@@ -95,9 +95,9 @@ pub(crate) struct PreviewArgs {
     /// The picture to write (8 bit, sRGB-coded).
     #[arg(short, long, default_value = "preview.png", value_name = "FILE")]
     pub(crate) output: PathBuf,
-    /// Pixels of the picture.
-    #[arg(long, default_value = "400x400", value_parser = size, value_name = "WxH")]
-    pub(crate) size: (usize, usize),
+    /// Pixels of the picture [default: 400 along the longer side].
+    #[arg(long, value_parser = size, value_name = "WxH")]
+    pub(crate) size: Option<(usize, usize)>,
     /// Look at a part of the plate only: first column and row, and its size.
     #[arg(long, value_parser = part, value_name = "COLUMN,ROW,WxH")]
     pub(crate) part: Option<[u64; 4]>,

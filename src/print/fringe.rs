@@ -30,7 +30,7 @@ use std::ops::AddAssign;
 use std::time::Instant;
 
 /// Pixels beside and above a tile in which error diffusion settles: its errors are forgotten after some ten pixels.
-const HALO: i64 = 24;
+pub(super) const HALO: i64 = 24;
 
 /// Memory that one field may take beside its points [bytes].
 const FIELD_MEMORY: u64 = 512 << 20;
@@ -148,7 +148,7 @@ impl Maker<'_> {
     }
 
     /// The fringe's transmittance on a rectangle, 0 to 1, for a field whose full swing is `amplitude`.
-    fn fringe(&self, field: &[Complex32], rect: &Rect, amplitude: f32) -> Vec<f32> {
+    pub(super) fn fringe(&self, field: &[Complex32], rect: &Rect, amplitude: f32) -> Vec<f32> {
         let plate = self.plate;
         let (bias, contrast) = (plate.bias as f32, plate.contrast as f32);
         let rho = amplitude * plate.reference_ratio as f32;
@@ -186,6 +186,17 @@ impl Maker<'_> {
     /// # Errors
     /// As [`Maker::field`].
     pub fn tile(&self, index: u64, amplitude: f32, progress: &Progress) -> Result<(Vec<u8>, Work)> {
+        self.tile_with(index, amplitude, HALO, progress)
+    }
+
+    /// The same with error diffusion begun so many pixels outside.
+    pub(super) fn tile_with(
+        &self,
+        index: u64,
+        amplitude: f32,
+        halo: i64,
+        progress: &Progress,
+    ) -> Result<(Vec<u8>, Work)> {
         let plate = self.plate;
         let area = fringe_area(plate);
         let core = tile_on_plate(plate, index).and(&area);
@@ -193,7 +204,7 @@ impl Maker<'_> {
         let (mut wishes, mut work, mut grown) = (Vec::new(), Work::default(), core);
         if core.area() > 0 {
             if plate.bits == 1 && plate.binarisation == Binarisation::Diffusion {
-                grown = core.grown(HALO, &area);
+                grown = core.grown(halo, &area);
             }
             let (field, took) = self.field(&grown, &pieces(plate, &core, &grown), progress)?;
             work = took;

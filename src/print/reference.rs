@@ -162,8 +162,8 @@ impl Band {
         let mut divisor = [1; 2];
         for axis in 0..2 {
             let asked = plate.object_angle.map_or(f64::INFINITY, |angle| angle[axis].sin() / plate.wavelength);
-            // Rounded up, but for the rounding of an angle that stands exactly at half the limit.
-            divisor[axis] = (limit[axis] / room[axis].min(asked) * (1.0 - 1e-3)).ceil().max(1.0) as u32;
+            // The band's outermost twentieth holds 4e-4 of the light: so much of it may lie on the zero order.
+            divisor[axis] = (0.95 * limit[axis] / room[axis].min(asked)).ceil().max(1.0) as u32;
             if divisor[axis] > 64 {
                 let what =
                     format!("object_angle leaves 1/{} of what the pitch carries; take a coarser pitch", divisor[axis]);

@@ -38,22 +38,21 @@ enum Kind {
     Long8 = 16,
 }
 
-/// Pixels a centimetre for a pitch [m], as an exact fraction where 32 bits hold it.
+/// Pixels a centimetre for a pitch [m]: the exact fraction where 32 bits hold it, else the nearest that they hold.
 pub(super) fn resolution(pitch: f64) -> [u32; 2] {
     // Whole femtometres: finer than any pitch is known.
     let (mut a, mut b) = (10_000_000_000_000u64, (pitch * 1e15).round().max(1.0) as u64);
-    let divisor = {
-        let (mut a, mut b) = (a, b);
-        while b != 0 {
-            (a, b) = (b, a % b);
+    let (mut before, mut now) = ([0u64, 1], [1u64, 0]);
+    // Convergents of the continued fraction; the last is the fraction itself in lowest terms.
+    while b != 0 {
+        let next = [0, 1].map(|i| (a / b).saturating_mul(now[i]).saturating_add(before[i]));
+        if next.iter().any(|&v| v > u64::from(u32::MAX)) {
+            break;
         }
-        a
-    };
-    (a, b) = (a / divisor, b / divisor);
-    while a > u64::from(u32::MAX) || b > u64::from(u32::MAX) {
-        (a, b) = (a / 2, b / 2);
+        (before, now) = (now, next);
+        (a, b) = (b, a % b);
     }
-    [a as u32, b.max(1) as u32]
+    now.map(|v| v.max(1) as u32)
 }
 
 impl Layout {
