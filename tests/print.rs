@@ -419,3 +419,72 @@ fn independent_readers_see_the_same_levels() {
         ),
     );
 }
+
+/// Gray values of a PNG, averaged over 5 × 5 pixels: speckle is not what is compared.
+fn picture(path: &Path) -> (usize, usize, Vec<f32>) {
+    let gray = image::open(path).expect("picture").into_luma8();
+    let (width, height) = (gray.width() as usize / 5, gray.height() as usize / 5);
+    let mean = |i: usize| {
+        let (column, row) = (i % width * 5, i / width * 5);
+        let all = (0..25).map(|k| f32::from(gray.get_pixel((column + k % 5) as u32, (row + k / 5) as u32).0[0]));
+        all.sum::<f32>() / 25.0 / 255.0
+    };
+    (width, height, (0..width * height).map(mean).collect())
+}
+
+#[test]
+fn five_eyes_see_in_the_fringes_what_rays_show_each_of_them() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let scene = root.join("scenes/cornell.gltf").display().to_string();
+    let text = fs::read_to_string(root.join("calib/plate-small.toml")).expect("plate");
+    // The zero order goes upwards, out of these eyes' way; file and plate are turned against each other.
+    let text = text.replace("angle = [\"9.1deg\", \"0deg\"]", "angle = [\"0deg\", \"9.1deg\"]");
+    let text = text.replace("tile = 256", "tile = 256\nmirror = true\nrotation = 90");
+    fs::write(f.join("plate.toml"), text).expect("plate");
+    done(f, &["print", &scene, "--plate", "plate.toml", "-o", "plate"]);
+    let eyes = ["0mm,0mm", "-2.5mm,0mm", "2.5mm,0mm", "0mm,-2.5mm", "1.5mm,1.2mm"];
+    let (mut seen, mut traced) = (Vec::new(), Vec::new());
+    for (i, eye) in eyes.into_iter().enumerate() {
+        let (at, name) = (format!("{eye},40mm"), format!("eye{i}.png"));
+        let preview = ["print", "preview", "plate", "--eye", &at, "--focus", "6mm", "--traced", &scene, "-o", &name];
+        let report = done(f, &preview);
+        assert_eq!(report["focus"], -6e-3, "without a sign it is the scene's side");
+        seen.push(picture(&f.join(&name)));
+        traced.push(picture(&f.join(format!("eye{i}-traced.png"))));
+    }
+    for (i, (width, height, values)) in seen.iter().enumerate() {
+        let likeness: Vec<f64> = traced
+            .iter()
+            .map(|(_, _, other)| holodrive::reconstruction::metrics::ssim(values, other, *width, *height))
+            .collect();
+        println!("{}: SSIM {likeness:.2?}", eyes[i]);
+        let best = (0..eyes.len()).max_by(|&a, &b| likeness[a].total_cmp(&likeness[b])).expect("eyes");
+        assert_eq!(best, i, "eye {} sees what eye {best} should: {likeness:?}", eyes[i]);
+    }
+}
+
+#[test]
+fn a_scene_is_the_same_plate_by_one_thread_and_by_two_in_parts() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let scene = root.join("scenes/cornell.gltf").display().to_string();
+    let text = fs::read_to_string(root.join("calib/plate-small.toml")).expect("plate");
+    fs::write(f.join("plate.toml"), text.replace("[1024, 768]", "[600, 512]").replace("bits = 8", "bits = 1"))
+        .expect("plate");
+    let run = |to: &str, threads: &str, shard: &str| {
+        let arguments = ["print", &scene, "--plate", "plate.toml", "-o", to, "--shard", shard];
+        let command = Command::new(env!("CARGO_BIN_EXE_holodrive"))
+            .args(arguments)
+            .env("RAYON_NUM_THREADS", threads)
+            .current_dir(f)
+            .output();
+        assert!(command.expect("runs").status.success());
+    };
+    run("one", "1", "0/1");
+    run("two", "2", "1/2");
+    run("two", "2", "0/2");
+    assert!(contents(&f.join("one")) == contents(&f.join("two")));
+}

@@ -181,8 +181,11 @@ fn write_frames(
         ));
     }
     let size = reader.size();
-    let [pitch_x, pitch_y] =
-        if plate.rotation % 180 == 0 { [plate.pitch_x, plate.pitch_y] } else { [plate.pitch_y, plate.pitch_x] };
+    let [pitch_x, pitch_y] = if plate.rotation.is_multiple_of(180) {
+        [plate.pitch_x, plate.pitch_y]
+    } else {
+        [plate.pitch_y, plate.pitch_x]
+    };
     let step = [width - frames.overlap, height - frames.overlap];
     let count = |size: u64, step: u64| (size.saturating_sub(frames.overlap)).div_ceil(step).max(1);
     let counts = [count(size[0], step[0]), count(size[1], step[1])];

@@ -40,7 +40,7 @@ impl Rect {
 
 /// Columns and rows of the file.
 pub(super) fn file_size(plate: &Plate) -> [u64; 2] {
-    if plate.rotation % 180 == 0 { [plate.width, plate.height] } else { [plate.height, plate.width] }
+    if plate.rotation.is_multiple_of(180) { [plate.width, plate.height] } else { [plate.height, plate.width] }
 }
 
 /// The plate's pixel that the file shows at a column and row.

@@ -63,8 +63,11 @@ impl Layout {
         let tiles = counts[0] * counts[1];
         let tile_bytes = plate.tile * plate.tile * u64::from(plate.bits) / 8;
         let stride = tile_bytes.next_multiple_of(ALIGN);
-        let [pitch_x, pitch_y] =
-            if plate.rotation % 180 == 0 { [plate.pitch_x, plate.pitch_y] } else { [plate.pitch_y, plate.pitch_x] };
+        let [pitch_x, pitch_y] = if plate.rotation.is_multiple_of(180) {
+            [plate.pitch_x, plate.pitch_y]
+        } else {
+            [plate.pitch_y, plate.pitch_x]
+        };
         let what = format!(
             "holodrive plate {}: {}-bit fringes, pitch {} x {}, wavelength {}; white is the highest level",
             plate.name,
@@ -87,8 +90,8 @@ impl Layout {
         };
         // The lists' own length does not depend on what is in them: the first tile's place is found with zeros.
         let build = |first: u64| {
-            let tags: Vec<(u16, (Kind, u64, Vec<u8>))> = vec![
-                (256, long(width)),
+            let tags = vec![
+                (256u16, long(width)),
                 (257, long(height)),
                 (258, short(u16::from(plate.bits))),
                 (259, short(1)),
