@@ -53,8 +53,9 @@
 //! 14. [`reconstruction`]: field to pictures, gray or in three lasers' colours, and how good they are
 //! 15. [`pipeline`]: the whole way, on one screen
 //! 16. [`comparison`]: all encodings side by side, with figures
-//! 17. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols
-//! 18. [`display`]: monitors and the fullscreen window (feature `display`)
+//! 17. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
+//! 18. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols
+//! 19. [`display`]: monitors and the fullscreen window (feature `display`)
 
 pub mod comparison;
 #[cfg(feature = "display")]
@@ -68,6 +69,7 @@ pub mod illumination;
 pub mod panel;
 pub mod pipeline;
 pub mod points;
+pub mod print;
 pub mod progress;
 pub mod propagation;
 pub mod random;

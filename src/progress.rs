@@ -5,8 +5,8 @@
 //! [`Progress::stop`]. The library never prints.
 
 use crate::error::{Error, Result};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// Counters of one running job, shared between the worker and its watcher.
 #[derive(Debug, Default)]
@@ -14,13 +14,17 @@ pub struct Progress {
     step: Mutex<String>,
     done: AtomicU64,
     total: AtomicU64,
-    stop: AtomicBool,
+    stop: Arc<AtomicBool>,
 }
 
 impl Progress {
     /// A job that has not begun.
     pub fn new() -> Self {
         Self::default()
+    }
+    /// A part of this job with counters of its own that nobody watches; it is stopped with the whole.
+    pub fn part(&self) -> Self {
+        Self { stop: Arc::clone(&self.stop), ..Self::default() }
     }
     /// Names the step that begins and the amount of work in it (any unit; 0 when unknown).
     pub fn start(&self, step: &str, total: u64) {

@@ -6,6 +6,7 @@ use holodrive::encode::Encoding;
 use holodrive::units;
 use std::path::PathBuf;
 
+pub(crate) use super::print_args::{ExportArgs, ExportFormat, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs};
 pub(crate) use super::scene_args::{
     ColorArgs, DepthArg, FormFactorArg, MirrorDepthArg, PhaseArg, PlacementArg, PlacementArgs, SceneArgs, Wavelengths,
     White,
@@ -78,6 +79,11 @@ pub(crate) enum Command {
         #[command(subcommand)]
         what: super::bench::BenchCommand,
     },
+    /// Print a hologram: fringes of a plate of any size, tile by tile into a file.
+    #[command(
+        after_help = "Examples:\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml --dry-run\n  holodrive print scenes/cornell.gltf --plate calib/plate-small.toml -o plate\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml -o plate --shard auto"
+    )]
+    Print(PrintArgs),
     /// List the monitors, and which panel profile fits each.
     Monitors(MonitorsArgs),
     /// Look at everything on this desktop that alters levels on their way to a panel.
@@ -458,7 +464,7 @@ fn pair(text: &str, one: impl Fn(&str) -> Result<f64, String>) -> Result<[f64; 2
     }
 }
 
-fn position(text: &str) -> Result<[f64; 3], String> {
+pub(super) fn position(text: &str) -> Result<[f64; 3], String> {
     let parts: Vec<f64> =
         text.split(',').map(units::length).collect::<holodrive::Result<_>>().map_err(|e| e.to_string())?;
     <[f64; 3]>::try_from(parts).map_err(|_| format!("`{text}` is not x,y,z such as 0mm,0mm,600mm"))

@@ -5,9 +5,7 @@ use super::bar::Bar;
 use super::colour;
 use super::layers;
 use super::light::report_gamut;
-use super::load::{
-    Input, channel, depth_scale, hologram_settings, input, load_points, panel_in_color, placed_by,
-};
+use super::load::{Input, channel, depth_scale, hologram_settings, input, load_points, panel_in_color, placed_by};
 use super::report::{Report, seconds};
 use glam::DVec2;
 use holodrive::field::{Field, npy};

@@ -12,6 +12,8 @@ mod light;
 mod load;
 mod monitors;
 mod parallax;
+mod print;
+mod print_args;
 mod report;
 mod scene_args;
 #[cfg(feature = "display")]
@@ -49,6 +51,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Show(args) => show::show(&args),
         Command::Bench { what } => bench::bench(&what),
         Command::Calibrate { what } => calibrate::calibrate(&what),
+        Command::Print(args) => print::print(&args, json),
         Command::Monitors(args) => monitors::monitors(&args),
         Command::Doctor(args) => monitors::doctor(&args),
     };
@@ -68,7 +71,7 @@ fn one_line(refused: &clap::Error) -> String {
     let words = first.join(" ");
     let words = words.strip_prefix("error: ").unwrap_or(&words);
     if refused.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return "holodrive: a command is needed: points, compute, propagate, encode, reconstruct, show, calibrate, bench, monitors or doctor (see holodrive --help)".into();
+        return "holodrive: a command is needed: points, compute, propagate, encode, reconstruct, show, print, calibrate, bench, monitors or doctor (see holodrive --help)".into();
     }
     format!("holodrive: {words} (see holodrive --help)")
 }

@@ -136,7 +136,7 @@ pub(crate) enum White {
     At(f32),
 }
 
-fn white(text: &str) -> Result<White, String> {
+pub(super) fn white(text: &str) -> Result<White, String> {
     match text {
         "auto" => Ok(White::Auto),
         "none" => Ok(White::None),

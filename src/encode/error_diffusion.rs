@@ -85,7 +85,7 @@ pub(super) fn pattern(
 
 /// Runs over rows; `show(i, wish)` returns the error that pixel i leaves, which its neighbours share as 7, 3, 5 and 1
 /// sixteenths: ahead, below behind, below, below ahead. What would leave the picture is dropped.
-pub(super) fn diffuse<T>(wishes: &mut [T], width: usize, serpentine: bool, mut show: impl FnMut(usize, T) -> T)
+pub(crate) fn diffuse<T>(wishes: &mut [T], width: usize, serpentine: bool, mut show: impl FnMut(usize, T) -> T)
 where
     T: Copy + std::ops::Mul<f32, Output = T> + std::ops::AddAssign,
 {

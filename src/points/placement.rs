@@ -152,6 +152,7 @@ impl Placement {
                     name: "eye".into(),
                     world_from_camera: DMat4::from_mat3_translation(axes, world_from_hologram.transform_point3(eye)),
                     projection: Projection::Perspective { yfov: 2.0 * (window.y / eye.z).atan(), aspect: Some(aspect) },
+                    before: 0.0,
                 };
                 Ok(Placing { camera, aspect, eye, window, map: Map::Model { hologram_from_world } })
             }
@@ -257,6 +258,14 @@ impl Placing {
                 DVec3::new(x / half_width * self.window.x * spread, y / half_height * self.window.y * spread, z)
             })
             .collect()
+    }
+
+    /// The similarity transform of a model; a window has none, since it is true for one eye only.
+    pub fn hologram_from_world(&self) -> Option<DMat4> {
+        match self.map {
+            Map::Model { hologram_from_world } => Some(hologram_from_world),
+            Map::Window { .. } => None,
+        }
     }
 
     /// The rectangle of the plane `z` that the eye sees through the window: half width and half height [m].

@@ -31,6 +31,9 @@ pub struct Camera {
     pub world_from_camera: DMat4,
     /// How it projects.
     pub projection: Projection,
+    /// How far before the pinhole its rays begin, to pass through it [m]: lines of sight of a viewer who looks through a
+    /// place of a plate. 0 for a camera.
+    pub before: f64,
 }
 
 impl Camera {
@@ -62,10 +65,8 @@ impl Camera {
             Projection::Perspective { .. } => (DVec3::ZERO, DVec3::new(x, y, -1.0)),
             Projection::Orthographic { .. } => (DVec3::new(x, y, 0.0), DVec3::NEG_Z),
         };
-        Ray {
-            origin: self.world_from_camera.transform_point3(origin),
-            direction: self.world_from_camera.transform_vector3(direction).normalize(),
-        }
+        let direction = self.world_from_camera.transform_vector3(direction).normalize();
+        Ray { origin: self.world_from_camera.transform_point3(origin) - self.before * direction, direction }
     }
     /// A perspective camera at `eye` that looks at `target` with +y up.
     pub fn looking_at(eye: DVec3, target: DVec3, yfov: f64) -> Self {
@@ -77,6 +78,7 @@ impl Camera {
             name: String::new(),
             world_from_camera: DMat4::from_mat3_translation(axes, eye),
             projection: Projection::Perspective { yfov, aspect: None },
+            before: 0.0,
         }
     }
 }

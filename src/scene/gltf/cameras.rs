@@ -43,6 +43,7 @@ pub(super) fn read(
             name: its_names.first().map_or_else(|| format!("camera {}", cameras.len()), |&n| n.to_owned()),
             world_from_camera: pose,
             projection: projection(document, json, &what)?,
+            before: 0.0,
         });
         names.push(its_names);
     }

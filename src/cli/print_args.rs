@@ -1,0 +1,161 @@
+//! Flags of plates.
+
+use super::args::size;
+use super::scene_args::{White, white};
+use clap::{Args, Subcommand, ValueEnum};
+use holodrive::units;
+use std::path::PathBuf;
+
+/// Fringes of a plate into a folder, and what is done with such a folder.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub(crate) struct PrintArgs {
+    #[command(subcommand)]
+    pub(crate) command: Option<PrintCommand>,
+    /// A scene (.gltf, .glb), seen truly from each segment of the plate, or a point cloud (.ply).
+    pub(crate) input: Option<PathBuf>,
+    /// The plate: a TOML file, such as those of calib/ whose names begin with plate-.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) plate: Option<PathBuf>,
+    /// Folder for the plate. One that was begun with the same settings is gone on with; one of others is refused.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Only say what it will take, and write nothing.
+    #[arg(long)]
+    pub(crate) dry_run: bool,
+    /// Compute part i of n only, i from 0 on; `auto` (or `auto/n`) takes it from Slurm's or Kubernetes' variables.
+    #[arg(long, value_name = "I/N|auto")]
+    pub(crate) shard: Option<String>,
+    #[command(flatten)]
+    pub(crate) light: PlateLightArgs,
+}
+
+/// How a plate's scene is lit.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct PlateLightArgs {
+    /// Camera of the scene, by name or number: its direction is that of the viewer [default: the first].
+    #[arg(long, value_name = "NAME")]
+    pub(crate) camera: Option<String>,
+    /// Animation clip, by name or number.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) animation: Option<String>,
+    /// Time in the animation [s].
+    #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
+    pub(crate) time: f64,
+    /// Add the light that a file without any gets.
+    #[arg(long)]
+    pub(crate) viewer_light: bool,
+    /// Most mirrors and glass surfaces on a path of light.
+    #[arg(long, default_value_t = 32, value_name = "N")]
+    pub(crate) bounces: u32,
+    /// Photons that lamps send through curved mirrors and glass.
+    #[arg(long, default_value_t = 400_000, value_name = "N")]
+    pub(crate) photons: u32,
+    /// Clip light brighter than white: auto, none, or a radiance [default: auto].
+    #[arg(long, value_parser = white, value_name = "WHITE")]
+    pub(crate) white: Option<White>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum PrintCommand {
+    /// Check every byte of a finished plate against its manifest.
+    #[command(after_help = "Example:\n  holodrive print verify plate")]
+    Verify(VerifyArgs),
+    /// Show what an eye sees of a finished plate, from the fringes in its file.
+    #[command(
+        after_help = "Examples:\n  holodrive print preview plate --eye 0mm,0mm,60mm --focus 6mm -o seen.png\n  holodrive print preview plate --eye 5mm,0mm,60mm --focus 6mm --traced scenes/cornell.gltf -o right.png"
+    )]
+    Preview(PreviewArgs),
+    /// Write a finished plate in another format.
+    #[command(
+        after_help = "Examples:\n  holodrive print export plate --as zarr -o plate.zarr\n  holodrive print export plate --as png --frame 1920x1080 --serpentine -o frames\n  holodrive print export plate --as gds -o plate.gds"
+    )]
+    Export(ExportArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct VerifyArgs {
+    /// The plate's folder.
+    pub(crate) folder: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct PreviewArgs {
+    /// The plate's folder.
+    pub(crate) folder: PathBuf,
+    /// Where the eye is: x,y,z (hologram frame, z in front of the plate).
+    #[arg(long, value_parser = super::args::position, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub(crate) eye: [f64; 3],
+    /// Depth that it focuses on: +5mm in front of the plate, -5mm behind; without a sign the side of the scene.
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) focus: String,
+    /// Diameter of the eye's pupil.
+    #[arg(long, default_value = "4mm", value_parser = units::positive_length, value_name = "LENGTH")]
+    pub(crate) pupil: f64,
+    /// The picture to write (8 bit, sRGB-coded).
+    #[arg(short, long, default_value = "preview.png", value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    /// Pixels of the picture [default: 400 along the longer side].
+    #[arg(long, value_parser = size, value_name = "WxH")]
+    pub(crate) size: Option<(usize, usize)>,
+    /// Look at a part of the plate only: first column and row, and its size.
+    #[arg(long, value_parser = part, value_name = "COLUMN,ROW,WxH")]
+    pub(crate) part: Option<[u64; 4]>,
+    /// Also trace what the eye should see of this scene, the plate's own; write it beside as …-traced.png and compare.
+    #[arg(long, value_name = "SCENE")]
+    pub(crate) traced: Option<PathBuf>,
+    /// Part of the pixels that is not shown brighter than white.
+    #[arg(long, default_value_t = 0.995, value_name = "PART")]
+    pub(crate) white: f64,
+    /// Memory that it may take.
+    #[arg(long, default_value = "2GB", value_parser = units::memory, value_name = "SIZE")]
+    pub(crate) memory: u64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ExportFormat {
+    /// Zarr version 3: a shard a tile, one bit packed.
+    Zarr,
+    /// PNG frames.
+    Png,
+    /// BMP frames.
+    Bmp,
+    /// GDSII rectangles, for small masks.
+    Gds,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ExportArgs {
+    /// The plate's folder.
+    pub(crate) folder: PathBuf,
+    /// Format.
+    #[arg(long = "as", value_enum, value_name = "FORMAT")]
+    pub(crate) format: ExportFormat,
+    /// The folder to write, or the file for gds.
+    #[arg(short, long, value_name = "PATH")]
+    pub(crate) output: PathBuf,
+    /// png, bmp: columns and rows of an exposure.
+    #[arg(long, value_parser = size, value_name = "WxH")]
+    pub(crate) frame: Option<(usize, usize)>,
+    /// png, bmp: pixels that neighbouring exposures share.
+    #[arg(long, default_value_t = 0, value_name = "PIXELS")]
+    pub(crate) overlap: u64,
+    /// png, bmp: every second row of exposures from right to left.
+    #[arg(long)]
+    pub(crate) serpentine: bool,
+    /// png, bmp of 8 bits: levels fall linearly over the overlap, so that two exposures add up to one.
+    #[arg(long)]
+    pub(crate) window: bool,
+}
+
+fn part(text: &str) -> Result<[u64; 4], String> {
+    let wrong = || format!("`{text}` is not COLUMN,ROW,WxH such as 0,4096,4096x4096");
+    let mut parts = text.splitn(3, ',');
+    let mut number = || parts.next().and_then(|t| t.trim().parse::<u64>().ok());
+    let (Some(column), Some(row)) = (number(), number()) else { return Err(wrong()) };
+    let (width, height) = parts.next().and_then(|t| t.split_once(['x', '×'])).ok_or_else(wrong)?;
+    match (width.trim().parse(), height.trim().parse()) {
+        (Ok(width), Ok(height)) => Ok([column, row, width, height]),
+        _ => Err(wrong()),
+    }
+}

@@ -1,0 +1,315 @@
+//! A finished plate in other formats, streamed from its file: Zarr, frames for fringe printers, GDSII.
+
+use super::job;
+use super::manifest::Manifest;
+use super::plate::Plate;
+use super::tiff::{Layout, read_at, unpacked};
+use super::{gds, zarr};
+use crate::error::{Error, Result};
+use crate::files;
+use crate::progress::Progress;
+use serde::Serialize;
+use std::collections::VecDeque;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Levels that a reader keeps of tiles it has read [bytes].
+const KEPT: usize = 192 << 20;
+
+/// Reads a complete plate.
+#[derive(Debug)]
+pub struct Reader {
+    manifest: Manifest,
+    layout: Layout,
+    file: File,
+    path: PathBuf,
+    kept: VecDeque<(u64, Arc<Vec<u8>>)>,
+}
+
+impl Reader {
+    /// Opens the plate of a folder.
+    ///
+    /// # Errors
+    /// Those of a plate that is missing, incomplete or damaged.
+    pub fn open(folder: &Path) -> Result<Self> {
+        let (manifest, layout, file, path) = job::open(folder)?;
+        Ok(Self { manifest, layout, file, path, kept: VecDeque::new() })
+    }
+    /// The plate.
+    pub fn plate(&self) -> &Plate {
+        &self.manifest.settings.plate
+    }
+    /// What it was made of.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+    /// Number of tiles.
+    pub fn tiles(&self) -> u64 {
+        self.layout.tiles
+    }
+    /// Columns and rows of the file.
+    pub fn size(&self) -> [u64; 2] {
+        super::geometry::file_size(self.plate())
+    }
+    /// The levels of a tile as the file shows it.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn tile(&mut self, index: u64) -> Result<Arc<Vec<u8>>> {
+        if let Some((_, levels)) = self.kept.iter().find(|(kept, _)| *kept == index) {
+            return Ok(Arc::clone(levels));
+        }
+        let bytes = read_at(&self.file, &self.path, self.layout.offset(index), self.layout.tile_bytes)?;
+        let levels = Arc::new(unpacked(&bytes, self.plate().bits));
+        while (self.kept.len() + 1) * levels.len() > KEPT && !self.kept.is_empty() {
+            self.kept.pop_front();
+        }
+        self.kept.push_back((index, Arc::clone(&levels)));
+        Ok(levels)
+    }
+    /// Levels of a rectangle of the file; what lies beyond its edge is 0.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn rectangle(&mut self, [column, row]: [u64; 2], [width, height]: [u64; 2]) -> Result<Vec<u8>> {
+        let tile = self.plate().tile;
+        let [file_width, file_height] = self.size();
+        let across = file_width.div_ceil(tile);
+        let mut out = vec![0u8; (width * height) as usize];
+        for tile_row in row / tile..(row + height).min(file_height).div_ceil(tile) {
+            for tile_column in column / tile..(column + width).min(file_width).div_ceil(tile) {
+                let levels = self.tile(tile_row * across + tile_column)?;
+                let rows = row.max(tile_row * tile)..(row + height).min((tile_row + 1) * tile);
+                let columns = column.max(tile_column * tile)..(column + width).min((tile_column + 1) * tile);
+                for r in rows {
+                    let from = ((r - tile_row * tile) * tile + columns.start - tile_column * tile) as usize;
+                    let to = ((r - row) * width + columns.start - column) as usize;
+                    let count = (columns.end - columns.start) as usize;
+                    out[to..to + count].copy_from_slice(&levels[from..from + count]);
+                }
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// A format to export to.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Format {
+    /// Zarr version 3, a shard for each tile; one bit is packed.
+    Zarr,
+    /// PNG frames.
+    Png(Frames),
+    /// BMP frames.
+    Bmp(Frames),
+    /// GDSII: a rectangle for each run of open pixels.
+    Gds,
+}
+
+/// How a plate is cut into exposures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frames {
+    /// Columns and rows of a frame.
+    pub size: [u64; 2],
+    /// Pixels that neighbours share.
+    pub overlap: u64,
+    /// Whether every second row of frames runs from right to left.
+    pub serpentine: bool,
+    /// Whether levels fall linearly over the overlap, so that two exposures add up to one (8 bits only).
+    pub window: bool,
+}
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Exported {
+    /// Files.
+    pub files: u64,
+    /// Their bytes.
+    pub bytes: u64,
+}
+
+/// Writes a finished plate in another format to `output`.
+///
+/// # Errors
+/// Those of a plate that is missing, incomplete or damaged; [`Error::Parameter`] for a format that cannot hold it; [`Error::Io`].
+pub fn export(folder: &Path, format: &Format, output: &Path, progress: &Progress) -> Result<Exported> {
+    let mut reader = Reader::open(folder)?;
+    match format {
+        Format::Zarr => zarr::write(&mut reader, output, progress),
+        Format::Gds => gds::write(&mut reader, output, progress),
+        Format::Png(frames) => write_frames(&mut reader, frames, output, "png", progress),
+        Format::Bmp(frames) => write_frames(&mut reader, frames, output, "bmp", progress),
+    }
+}
+
+/// One exposure.
+#[derive(Serialize)]
+struct Exposure {
+    file: String,
+    /// First column and row in the plate's file.
+    column: u64,
+    row: u64,
+    /// Where its middle stands, from the middle of the file, +y up [m].
+    x: f64,
+    y: f64,
+}
+
+fn write_frames(
+    reader: &mut Reader,
+    frames: &Frames,
+    output: &Path,
+    extension: &str,
+    progress: &Progress,
+) -> Result<Exported> {
+    let [width, height] = frames.size;
+    let smallest = width.min(height);
+    if !(1..=65_535).contains(&width) || !(1..=65_535).contains(&height) || width * height > 1 << 28 {
+        return Err(Error::parameter(
+            "frame",
+            format!("{width}x{height}: sides of 1 to 65535, 268 million pixels at most"),
+        ));
+    }
+    if frames.overlap * 2 > smallest {
+        return Err(Error::parameter("overlap", format!("{} is more than half of a frame", frames.overlap)));
+    }
+    let plate = reader.plate().clone();
+    if frames.window && (plate.bits == 1 || frames.overlap == 0) {
+        return Err(Error::parameter(
+            "window",
+            "levels fall over an overlap of 8-bit frames; this plate or overlap has none",
+        ));
+    }
+    let size = reader.size();
+    let [pitch_x, pitch_y] = if plate.rotation.is_multiple_of(180) {
+        [plate.pitch_x, plate.pitch_y]
+    } else {
+        [plate.pitch_y, plate.pitch_x]
+    };
+    let step = [width - frames.overlap, height - frames.overlap];
+    let count = |size: u64, step: u64| (size.saturating_sub(frames.overlap)).div_ceil(step).max(1);
+    let counts = [count(size[0], step[0]), count(size[1], step[1])];
+    files::output_folder(output)?;
+    progress.start("frames", counts[0] * counts[1]);
+    let mut exposures = Vec::new();
+    let mut written = Exported { files: 0, bytes: 0 };
+    for down in 0..counts[1] {
+        for i in 0..counts[0] {
+            progress.check()?;
+            let across = if frames.serpentine && down % 2 == 1 { counts[0] - 1 - i } else { i };
+            let [column, row] = [across * step[0], down * step[1]];
+            let mut levels = reader.rectangle([column, row], frames.size)?;
+            if frames.window {
+                let first = [across == 0, down == 0];
+                let last = [across + 1 == counts[0], down + 1 == counts[1]];
+                window(&mut levels, frames, first, last);
+            }
+            let name = format!("frame-{down:05}-{across:05}.{extension}");
+            let bytes = match extension {
+                "bmp" => bmp(&levels, frames.size, plate.bits, [pitch_x, pitch_y]),
+                _ => png_bytes(&levels, frames.size, plate.bits, [pitch_x, pitch_y], &output.join(&name))?,
+            };
+            files::write_bytes(&output.join(&name), &bytes)?;
+            written.files += 1;
+            written.bytes += bytes.len() as u64;
+            let middle = |from: u64, side: u64, whole: u64| from as f64 + 0.5 * side as f64 - 0.5 * whole as f64;
+            exposures.push(Exposure {
+                file: name,
+                column,
+                row,
+                x: middle(column, width, size[0]) * pitch_x,
+                y: -middle(row, height, size[1]) * pitch_y,
+            });
+            progress.advance(1);
+        }
+    }
+    let list = serde_json::json!({
+        "plate": plate.name,
+        "size": size,
+        "pitch": [pitch_x, pitch_y],
+        "wavelength": plate.wavelength,
+        "bits": plate.bits,
+        "frame": frames.size,
+        "overlap": frames.overlap,
+        "window": if frames.window { "linear" } else { "none" },
+        "order": if frames.serpentine { "boustrophedon" } else { "rows" },
+        "exposures": exposures,
+    });
+    let text = serde_json::to_string_pretty(&list).unwrap_or_default() + "\n";
+    // Last, so that a folder with a list is a whole set.
+    files::write_bytes(&output.join("frames.json"), text.as_bytes())?;
+    written.files += 1;
+    written.bytes += text.len() as u64;
+    Ok(written)
+}
+
+/// Lets levels fall towards edges that another frame overlaps; both ramps add up to one.
+fn window(levels: &mut [u8], frames: &Frames, first: [bool; 2], last: [bool; 2]) {
+    let weight = |at: u64, side: u64, axis: usize| {
+        let from_low = (at as f64 + 0.5) / frames.overlap as f64;
+        let from_high = (side as f64 - at as f64 - 0.5) / frames.overlap as f64;
+        let low = if first[axis] { 1.0 } else { from_low.min(1.0) };
+        let high = if last[axis] { 1.0 } else { from_high.min(1.0) };
+        low * high
+    };
+    let [width, height] = frames.size;
+    let across: Vec<f64> = (0..width).map(|c| weight(c, width, 0)).collect();
+    for (row, line) in (0..height).zip(levels.chunks_exact_mut(width as usize)) {
+        let down = weight(row, height, 1);
+        for (level, across) in line.iter_mut().zip(&across) {
+            *level = (f64::from(*level) * across * down).round() as u8;
+        }
+    }
+}
+
+/// Rows of levels, each padded to whole bytes, the first pixel high.
+fn rows(levels: &[u8], width: u64, bits: u8) -> impl Iterator<Item = Vec<u8>> {
+    levels.chunks_exact(width as usize).map(move |row| match bits {
+        1 => row.chunks(8).map(|eight| eight.iter().enumerate().fold(0, |b, (i, &l)| b | l << (7 - i))).collect(),
+        _ => row.to_vec(),
+    })
+}
+
+fn png_bytes(levels: &[u8], [width, height]: [u64; 2], bits: u8, pitch: [f64; 2], path: &Path) -> Result<Vec<u8>> {
+    let refused = |e: png::EncodingError| Error::input(path, e.to_string());
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, width as u32, height as u32);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(if bits == 1 { png::BitDepth::One } else { png::BitDepth::Eight });
+    let [xppu, yppu] = pitch.map(|pitch| (1.0 / pitch).round() as u32);
+    encoder.set_pixel_dims(Some(png::PixelDimensions { xppu, yppu, unit: png::Unit::Meter }));
+    let mut writer = encoder.write_header().map_err(refused)?;
+    let data: Vec<u8> = rows(levels, width, bits).flatten().collect();
+    writer.write_image_data(&data).map_err(refused)?;
+    writer.finish().map_err(refused)?;
+    Ok(out)
+}
+
+/// A Windows bitmap of 1 or 8 bits with a gray palette, rows from the bottom up.
+fn bmp(levels: &[u8], [width, height]: [u64; 2], bits: u8, pitch: [f64; 2]) -> Vec<u8> {
+    let colors: u32 = 1 << bits;
+    let stride = ((width * u64::from(bits)).div_ceil(32) * 4) as usize;
+    let first = 14 + 40 + 4 * colors;
+    let data = stride as u32 * height as u32;
+    let mut out = b"BM".to_vec();
+    for value in [first + data, 0, first, 40, width as u32, height as u32] {
+        out.extend(value.to_le_bytes());
+    }
+    for value in [1u16, u16::from(bits)] {
+        out.extend(value.to_le_bytes());
+    }
+    let [x, y] = pitch.map(|pitch| (1.0 / pitch).round() as u32);
+    for value in [0, data, x, y, colors, 0] {
+        out.extend(value.to_le_bytes());
+    }
+    for i in 0..colors {
+        let gray = (i * 255 / (colors - 1)) as u8;
+        out.extend([gray, gray, gray, 0]);
+    }
+    let lines: Vec<Vec<u8>> = rows(levels, width, bits).collect();
+    for mut line in lines.into_iter().rev() {
+        line.resize(stride, 0);
+        out.extend(line);
+    }
+    out
+}

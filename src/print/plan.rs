@@ -1,0 +1,241 @@
+//! What a plate will take, and every reason why it would be wrong: found on a few small fields before the work.
+
+use super::fringe::{Maker, Work, amplitude_at};
+use super::geometry::{Piece, Rect, file_size, fringe_area, tile_counts};
+use super::plate::{Binarisation, Quantity};
+use super::reference::{Band, Reference};
+use super::tiff::{Layout, resolution};
+use super::views::Source;
+use crate::error::{Error, Result};
+use crate::field::Complex32;
+use crate::progress::Progress;
+use serde::Serialize;
+
+/// Segments looked at along each side of the plate.
+const LATTICE: i64 = 4;
+/// Side of the field that is computed in the middle of each [px].
+const PATCH: i64 = 192;
+
+/// What a few small fields of the plate show.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sample {
+    /// Amplitude of the object that swings the fringe fully, to four digits.
+    pub amplitude: f32,
+    /// Share of the sampled pixels whose amplitude is larger.
+    pub clipped: f64,
+    /// Most points of one segment.
+    pub most_points: u64,
+    /// What the fields took.
+    pub work: Work,
+    /// Segments of the plate.
+    pub segments: u64,
+}
+
+/// What will be done.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Plan {
+    /// Pixels of the file across and down.
+    pub size: [u64; 2],
+    /// Width and height of the plate [m].
+    pub extent: [f64; 2],
+    /// Tiles across and down.
+    pub tiles: [u64; 2],
+    /// Segments, counted once for each tile that they lie in.
+    pub segments: u64,
+    /// Points of a segment: mean of the sampled ones, and most.
+    pub points: [u64; 2],
+    /// Rays of all segments, or 0 for a cloud.
+    pub rays: u64,
+    /// Point–pixel pairs of the whole plate.
+    pub pairs: f64,
+    /// Half angles of the object's light [rad].
+    pub object_angle: [f64; 2],
+    /// Largest angle that the pitch diffracts, along x and y [rad].
+    pub diffraction_angle: [f64; 2],
+    /// Lowest and highest spatial frequency of the reference along x and y [cycles/m].
+    pub reference: [[f64; 2]; 2],
+    /// Amplitude that swings the fringe fully.
+    pub amplitude: f32,
+    /// Time on this machine, measured on the samples [s].
+    pub seconds: f64,
+    /// The same on a hundred machines like it [s].
+    pub seconds_on_100: f64,
+    /// Memory [bytes].
+    pub memory: u64,
+    /// Length of the file [bytes].
+    pub disk: u64,
+    /// Files that will be there.
+    pub files: Vec<String>,
+    /// Pixels a centimetre along x and y, as fractions.
+    pub resolution: [[u32; 2]; 2],
+    /// What a user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Computes small fields in segments all over the plate.
+///
+/// # Errors
+/// [`Error::Parameter`] when no point is seen from any of them; those of [`Maker::field`].
+pub fn sample(maker: &Maker, progress: &Progress) -> Result<Sample> {
+    let plate = maker.plate;
+    let area = fringe_area(plate);
+    let side = plate.segment as i64;
+    let across = |range: [i64; 2]| [range[0].div_euclid(side), (range[1] - 1).div_euclid(side)];
+    let (columns, rows) = (across(area.x), across(area.y));
+    let pick = |[first, last]: [i64; 2], i: i64| first + ((2 * i + 1) * (last - first + 1)) / (2 * LATTICE);
+    let mut places: Vec<[i64; 2]> =
+        (0..LATTICE * LATTICE).map(|i| [pick(columns, i % LATTICE), pick(rows, i / LATTICE)]).collect();
+    if let Source::Cloud(points) = maker.source {
+        // The light of points near the plate is where they are: a lattice of places may miss it.
+        let count = points.len();
+        for point in (0..16).filter_map(|i| points.get((2 * i + 1) * count / 32)) {
+            let column = (point.position.x / plate.pitch_x + 0.5 * plate.width as f64).floor() as i64;
+            let row = (0.5 * plate.height as f64 - point.position.y / plate.pitch_y).floor() as i64;
+            if (area.x[0]..area.x[1]).contains(&column) && (area.y[0]..area.y[1]).contains(&row) {
+                places.push([column.div_euclid(side), row.div_euclid(side)]);
+            }
+        }
+    }
+    places.sort_unstable();
+    places.dedup();
+    progress.start("samples", places.len() as u64);
+    let mut sample = Sample { amplitude: 0.0, clipped: 0.0, most_points: 0, work: Work::default(), segments: 0 };
+    let mut samples: Vec<f32> = Vec::new();
+    for segment in places {
+        progress.check()?;
+        let patch = |index: i64, bounds: [i64; 2]| {
+            let from = (index * side + (side - PATCH.min(side)) / 2).max(bounds[0]);
+            [from, (from + PATCH.min(side)).min(bounds[1]).max(from)]
+        };
+        let rect = Rect { x: patch(segment[0], area.x), y: patch(segment[1], area.y) };
+        progress.advance(1);
+        if rect.area() == 0 {
+            continue;
+        }
+        let (field, work) = maker.field(&rect, &[Piece { segment, rect }], progress)?;
+        sample.most_points = sample.most_points.max(work.points);
+        sample.work += work;
+        samples.extend(field.iter().map(|u: &Complex32| u.norm()));
+    }
+    if sample.work.points == 0 {
+        let [x, y] = maker.band.angle.map(f64::to_degrees);
+        let what = format!(
+            "none is seen from the plate within the {x:.2} deg × {y:.2} deg that it diffracts; move the scene or the viewer"
+        );
+        return Err(Error::parameter("points", what));
+    }
+    let amplitude = amplitude_at(&samples, plate.percentile);
+    // Four digits, so that the manifest's decimals are the very number that is used.
+    let amplitude: f32 = format!("{amplitude:.3e}").parse().unwrap_or(amplitude);
+    if !(amplitude > 0.0 && amplitude.is_finite()) {
+        let what = "their light does not reach the plate where it was sampled; move the scene, or widen object_angle";
+        return Err(Error::parameter("points", what));
+    }
+    sample.amplitude = amplitude;
+    sample.clipped = samples.iter().filter(|a| **a > amplitude).count() as f64 / samples.len() as f64;
+    // Tiles need not begin where segments do; then a segment is looked from in each tile that it lies in.
+    let [tiles_x, tiles_y] = tile_counts(plate);
+    let per_tile = plate.tile.div_ceil(plate.segment) + u64::from(!plate.tile.is_multiple_of(plate.segment));
+    sample.segments = tiles_x * tiles_y * per_tile * per_tile;
+    Ok(sample)
+}
+
+/// The plan, from a sample.
+pub fn plan(maker: &Maker, sample: &Sample) -> Plan {
+    let plate = maker.plate;
+    let Band { divisor, angle, .. } = maker.band;
+    let pixels = plate.width as f64 * plate.height as f64;
+    let work = &sample.work;
+    let per_pixel = (work.field_seconds + work.fringe_seconds) / work.pixels as f64;
+    let per_segment = work.points_seconds / work.segments as f64;
+    let halo = if plate.bits == 1 && plate.binarisation == Binarisation::Diffusion {
+        (1.0 + 48.0 / plate.tile as f64) * (1.0 + 24.0 / plate.tile as f64)
+    } else {
+        1.0
+    };
+    // The fringe itself: a reference wave and a level for each pixel.
+    const FRINGE: f64 = 4e-8;
+    let seconds = pixels * halo * (per_pixel + FRINGE) + per_segment * sample.segments as f64;
+    let layout = Layout::new(plate);
+    let side = plate.tile + 48;
+    let segment = (plate.segment / u64::from(divisor[0])) * (plate.segment / u64::from(divisor[1]));
+    let memory = side * side * 12 + plate.tile * plate.tile * 3 + segment * 8 + sample.most_points * 400 + (64 << 20);
+    let rays = match maker.source {
+        Source::Cloud(_) => 0,
+        Source::Scene(_) => {
+            (work.points as f64 / work.segments as f64 * sample.segments as f64) as u64 * u64::from(plate.rays).pow(2)
+        }
+    };
+    let sine = |pitch: f64| (plate.wavelength / (2.0 * pitch)).min(1.0).asin();
+    let mut plan = Plan {
+        size: file_size(plate),
+        extent: plate.extent(),
+        tiles: tile_counts(plate),
+        segments: sample.segments,
+        points: [work.points / work.segments.max(1), sample.most_points],
+        rays,
+        pairs: work.pairs / work.pixels as f64 * pixels * halo,
+        object_angle: angle,
+        diffraction_angle: [sine(plate.pitch_x), sine(plate.pitch_y)],
+        reference: plate.reference.frequencies(plate),
+        amplitude: sample.amplitude,
+        seconds,
+        seconds_on_100: seconds / 100.0,
+        memory,
+        disk: layout.length(),
+        files: vec![super::job::PLATE.to_owned(), super::manifest::NAME.to_owned()],
+        resolution: [resolution(plate.pitch_x), resolution(plate.pitch_y)],
+        warnings: Vec::new(),
+    };
+    plan.warnings = warnings(maker, &plan);
+    plan
+}
+
+fn warnings(maker: &Maker, plan: &Plan) -> Vec<String> {
+    let plate = maker.plate;
+    let mut out = Vec::new();
+    let mm = |metres: f64| format!("{:.3} mm", metres * 1e3);
+    let degrees = |angle: f64| format!("{:.2} deg", angle.to_degrees());
+    let depths = match maker.source {
+        Source::Scene(views) => views.depths(),
+        Source::Cloud(points) => points
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |d, p| [d[0].min(p.position.z), d[1].max(p.position.z)]),
+    };
+    for (axis, name) in ["x", "y"].into_iter().enumerate() {
+        // From the viewer's place the plate's edge is seen at an angle; what is sent there must reach it.
+        let edge = (0.5 * plan.extent[axis] / plate.viewer).atan();
+        if edge > maker.band.angle[axis] {
+            let seen = 2.0 * plate.viewer * maker.band.angle[axis].tan();
+            out.push(format!(
+                "along {name} the object's light spreads ±{}, the plate's edge is seen from {} at {}: a viewer there sees {} of the plate",
+                degrees(maker.band.angle[axis]),
+                mm(plate.viewer),
+                degrees(edge),
+                mm(seen)
+            ));
+        }
+    }
+    let segment = plate.segment as f64 * plate.pitch_x.max(plate.pitch_y);
+    let nearest = if depths[0] <= 0.0 && depths[1] >= 0.0 { 0.0 } else { depths[0].abs().min(depths[1].abs()) };
+    if nearest < segment && matches!(maker.source, Source::Scene(_)) {
+        out.push(format!(
+            "the scene comes within {} of the plate, less than a segment's {}: its occlusion is that of the segment's middle; a smaller segment is truer",
+            mm(nearest),
+            mm(segment)
+        ));
+    }
+    if plate.bits == 1 && plate.binarisation == Binarisation::Threshold && plate.reference == Reference::None {
+        out.push("a thresholded fringe without a carrier keeps little but edges; look at a preview".into());
+    }
+    if plate.bits == 1 && plate.quantity == Quantity::Phase {
+        out.push("a phase of two levels has a conjugate image as bright as the object".into());
+    }
+    if let Source::Cloud(_) = maker.source {
+        out.push("points are the same from everywhere: nothing hides anything; give a scene for true views".into());
+    }
+    if plate.pitch_x != plate.pitch_y {
+        out.push("pixels are not square; check that the printer's are the same".into());
+    }
+    out
+}
