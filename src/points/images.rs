@@ -54,11 +54,13 @@ impl Window {
     }
 }
 
+/// A picture of 16 bits a colour, sRGB-coded.
+pub type Picture16 = ImageBuffer<Rgb<u16>, Vec<u16>>;
+
 /// A picture and its depth map.
 #[derive(Clone, Debug)]
 pub struct RgbDepth {
-    /// sRGB-coded.
-    pub(super) picture: ImageBuffer<Rgb<u16>, Vec<u16>>,
+    pub(super) picture: Picture16,
     /// Gray, of the same size.
     pub(super) depths: ImageBuffer<Luma<u16>, Vec<u16>>,
     pub(super) scale: DepthScale,

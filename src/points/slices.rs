@@ -4,12 +4,11 @@
 //! sample of a plane looks up the picture, not the other way round.
 
 use super::colour::Lasers;
-use super::images::{RgbDepth, Window, open};
+use super::images::{Picture16, RgbDepth, Window, open};
 use super::{Channel, Placement};
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::scene::texture::linear_from_srgb;
-use image::{ImageBuffer, Rgb};
 use rayon::prelude::*;
 use std::path::PathBuf;
 
@@ -19,7 +18,7 @@ pub enum Source {
     /// A picture cut by its depth map.
     Depth(RgbDepth),
     /// Pictures sharp at one depth each, that fill the window there; z [m], farthest first.
-    Stack(Vec<(f64, ImageBuffer<Rgb<u16>, Vec<u16>>)>),
+    Stack(Vec<(f64, Picture16)>),
 }
 
 /// One colour of light.
@@ -84,7 +83,7 @@ impl Slices {
     /// [`Error::Input`] for a file that is no picture, or of another size than the first; [`Error::Parameter`] for no
     /// files, a depth at or behind the eye, or a placement that has no window.
     pub fn of_stack(files: &[(PathBuf, f64)], placement: &Placement, panel: &Grid) -> Result<Self> {
-        let mut stack: Vec<(f64, ImageBuffer<Rgb<u16>, Vec<u16>>)> = Vec::new();
+        let mut stack: Vec<(f64, Picture16)> = Vec::new();
         for (path, z) in files {
             let picture = open(path)?.into_rgb16();
             if let Some((_, first)) = stack.first()
@@ -108,7 +107,7 @@ impl Slices {
     }
 
     fn new(source: Source, window: Window, panel: &Grid, depths: Vec<f64>) -> Result<Self> {
-        if let Some(z) = depths.iter().find(|z| !(**z < window.eye)) {
+        if let Some(z) = depths.iter().find(|z| z.is_nan() || **z >= window.eye) {
             return Err(Error::parameter("depth", format!("{z} m is not in front of the eye at {} m", window.eye)));
         }
         let spread = depths.iter().map(|z| window.spread(*z)).fold(0.0, f64::max);
