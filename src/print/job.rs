@@ -1,6 +1,6 @@
 //! The work on a folder: begun, interrupted at any moment, gone on with, shared among processes, finished, checked.
 //!
-//! A folder holds `manifest.json` (see [`super::Manifest`]), the plate's file, until it is complete as `.plate.tif.partial`, and
+//! A folder holds `manifest.json` ([`Manifest`]), the plate's file, until it is complete as `.plate.tif.partial`, and
 //! in `.tiles` one list a process of the tiles that it finished, with their hashes. A tile enters the list after its bytes
 //! are on the disk. Whoever goes on reads the tiles of all lists again: one whose bytes have another hash is redone. When all
 //! are there, the file gets its name, the manifest their hashes, and the lists go: what is left does not tell by how many
@@ -298,7 +298,7 @@ pub(super) fn open(folder: &Path) -> Result<(Manifest, Layout, File, PathBuf)> {
 /// Checks a complete plate against its manifest.
 ///
 /// # Errors
-/// As reading the manifest; [`Error::Input`] that names the tiles whose bytes are not those that were computed.
+/// [`Error::Input`] for a plate that is missing, incomplete or damaged; it names the tiles whose bytes are not those that were computed.
 pub fn verify(folder: &Path, progress: &Progress) -> Result<Verified> {
     let begin = Instant::now();
     let (manifest, layout, file, path) = open(folder)?;
