@@ -52,9 +52,11 @@
 //! 13. [`encode`]: field to phase or fringes for a panel's levels and range
 //! 14. [`reconstruction`]: field to pictures, gray or in three lasers' colours, and how good they are
 //! 15. [`pipeline`]: the whole way, on one screen
-//! 16. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols
-//! 17. [`display`]: monitors and the fullscreen window (feature `display`)
+//! 16. [`comparison`]: all encodings side by side, with figures
+//! 17. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols
+//! 18. [`display`]: monitors and the fullscreen window (feature `display`)
 
+pub mod comparison;
 #[cfg(feature = "display")]
 pub mod display;
 pub mod encode;

@@ -45,8 +45,10 @@ pub(crate) enum Command {
         after_help = "Example:\n  holodrive propagate field.npy --pitch 8um --wavelength 532nm --distance 0.5m -o out.npy"
     )]
     Propagate(PropagateArgs),
-    /// Encode a field as a frame of drive levels for a panel.
-    #[command(after_help = "Example:\n  holodrive encode field.npy --method double-phase -o frame.png")]
+    /// Encode a field, or a picture at depths, as a frame of drive levels for a panel.
+    #[command(
+        after_help = "Examples:\n  holodrive encode field.npy --method double-phase -o frame.png\n  holodrive encode field.npy --method double-phase --blaze 0.6deg --lens 300mm -o frame.png\n  holodrive encode picture.png --method weighted --depths 100mm -o frame.png\n  holodrive encode rgb.png+depth.png --method plane-gradient --depths 100mm,120mm,150mm -o frame.png"
+    )]
     Encode(EncodeArgs),
     /// Reconstruct what is seen of a frame or a field: on a plane, or through an eye.
     #[command(
@@ -58,6 +60,24 @@ pub(crate) enum Command {
         after_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show scenes/cornell.gltf --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO"
     )]
     Show(ShowArgs),
+    /// Find a panel's curve and bend: frames to show, and what the measured numbers say.
+    #[command(
+        after_help = "Examples:\n  holodrive calibrate curve -o sweep\n  holodrive calibrate curve --powers sweep/manifest.csv -o mine.toml\n  holodrive calibrate flatness --zernike 0,0,0,0.8 --radius 6mm -o flat.npy --into mine.toml\n  holodrive calibrate check --panel mine.toml -o cards"
+    )]
+    Calibrate {
+        /// What to find.
+        #[command(subcommand)]
+        what: super::calibrate::CalibrateCommand,
+    },
+    /// Compare what this program offers, on the simulated panel.
+    #[command(
+        after_help = "Examples:\n  holodrive bench encodings\n  holodrive bench encodings --size 96x72 --iterations 20 --json"
+    )]
+    Bench {
+        /// What to compare.
+        #[command(subcommand)]
+        what: super::bench::BenchCommand,
+    },
     /// List the monitors, and which panel profile fits each.
     Monitors(MonitorsArgs),
     /// Look at everything on this desktop that alters levels on their way to a panel.
@@ -207,15 +227,55 @@ pub(crate) struct EncodingArgs {
     /// Off-axis: angle of the reference wave, x or x,y.
     #[arg(long, value_parser = angles, value_name = "ANGLE[,ANGLE]", allow_hyphen_values = true)]
     pub(crate) reference_angle: Option<[f64; 2]>,
+    /// Wavefront correction (.npy of radians, .bmp or .png of a vendor, Santec's .csv), or `none` [default: the profile's].
+    #[arg(long, value_name = "FILE")]
+    pub(crate) correction: Option<String>,
+    /// Depths at which plane-gradient, gerchberg-saxton, weighted and double-constraint put the picture, from the panel,
+    /// signed as reconstruct's --distance [default: three over the content's depth].
+    #[arg(long, value_name = "LENGTH,…", value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) depths: Vec<String>,
+    /// Iterations of gradient and of the methods with depths.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=100_000), value_name = "N")]
+    pub(crate) iterations: Option<u64>,
+    /// First phases of the methods with depths.
+    #[arg(long, value_enum, value_name = "PHASES")]
+    pub(crate) start: Option<StartArg>,
+    /// Carrier: in straight light the object goes aside by this angle, off the zero order; x or x,y.
+    #[arg(long, value_parser = angles, value_name = "ANGLE[,ANGLE]", allow_hyphen_values = true)]
+    pub(crate) blaze: Option<[f64; 2]>,
+    /// Digital lens: the pattern focuses the light by this focal length.
+    #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) lens: Option<f64>,
+    /// Keep the object's light out of this angle about the axis, where a stop for the zero order stands.
+    #[arg(long, value_parser = units::angle, value_name = "ANGLE")]
+    pub(crate) band_stop: Option<f64>,
+}
+
+/// First phases of an iteration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum StartArg {
+    /// The field's own.
+    Field,
+    /// The same everywhere.
+    Constant,
+    /// Random: speckle.
+    Random,
+    /// A lens: no speckle.
+    Quadratic,
+    /// Random, changing smoothly.
+    Smooth,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct EncodeArgs {
-    /// The field (.npy).
+    /// The field (.npy), or a picture (.png, .bmp; with its depth map: rgb.png+depth.png).
     pub(crate) input: PathBuf,
     /// The frame to write.
     #[arg(short, long, default_value = "frame.png", value_name = "FILE")]
     pub(crate) output: PathBuf,
+    /// Part of the panel's sides that a picture takes; the light beside it is free.
+    #[arg(long, default_value_t = 0.75, value_name = "SHARE")]
+    pub(crate) window: f64,
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
     #[command(flatten)]

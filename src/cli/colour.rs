@@ -1,7 +1,8 @@
 //! Three holograms from one trace: fields, frames and pictures in red, green and blue.
 
 use super::args::{ComputeArgs, ShowArgs};
-use super::commands::{content, encode_field, origin, report_field, seen_half};
+use super::commands::{content, origin, report_field, seen_half};
+use super::encoding::encode_field;
 use super::light::report_gamut;
 use super::load::{Panel, Points, hologram_settings};
 use super::report::Report;

@@ -1,22 +1,18 @@
 //! The steps, one by one.
 
-use super::args::{
-    ComputeArgs, EncodeArgs, EncodingArgs, FrameArg, KernelArg, PointsArgs, PropagateArgs, ReconstructArgs, White,
-};
+use super::args::{ComputeArgs, FrameArg, KernelArg, PointsArgs, PropagateArgs, ReconstructArgs, White};
 use super::bar::Bar;
 use super::colour;
 use super::light::report_gamut;
-use super::load::{Input, Panel, channel, hologram_settings, input, load_points, panel, panel_in_color};
+use super::load::{Input, channel, hologram_settings, input, load_points, panel_in_color};
 use super::report::{Report, seconds};
 use glam::DVec2;
-use holodrive::encode::{EncodeSettings, Encoding, Reference};
 use holodrive::field::{Field, npy};
 use holodrive::hologram::Computed;
 use holodrive::panel::simulated::Simulation;
-use holodrive::panel::{Frame, Modulation, Origin, PanelProfile};
+use holodrive::panel::{Frame, PanelProfile};
 use holodrive::pipeline::{self, Lit};
 use holodrive::points::{PointCloud, ply};
-use holodrive::progress::Progress;
 use holodrive::propagation::{self, Kernel, Propagator};
 use holodrive::reconstruction::{self, Picture, Scale, View, ViewSettings, write_rgb_png};
 use holodrive::units::{self, show_length};
@@ -156,84 +152,8 @@ pub(super) fn propagate(args: &PropagateArgs) -> Result<Report> {
     Ok(report)
 }
 
-/// Encoding settings for a kind of panel.
-pub(super) fn encode_settings(args: &EncodingArgs, panel: &Panel) -> Result<EncodeSettings> {
-    let chosen = args.encoding.as_deref().unwrap_or(match panel.profile.modulation() {
-        Modulation::Amplitude => "off-axis-bipolar",
-        Modulation::Phase => "double-phase",
-    });
-    let mut encoding = Encoding::named(chosen)?;
-    if let Some(angles) = args.reference_angle {
-        match &mut encoding {
-            Encoding::OffAxisBipolar(fringe) | Encoding::OffAxisIntensity(fringe) => {
-                fringe.reference = Some(Reference::Angle(angles));
-            }
-            Encoding::Binary(binary) => binary.fringe.reference = Some(Reference::Angle(angles)),
-            _ => {
-                let what = format!("{chosen} has no reference wave to turn; leave --reference-angle out");
-                return Err(Error::parameter("reference-angle", what));
-            }
-        }
-    }
-    Ok(EncodeSettings::new(encoding))
-}
-
-/// A field as a frame, with its time.
-pub(super) fn encode_field(
-    field: &Field,
-    args: &EncodingArgs,
-    panel: &Panel,
-    origin: &Origin,
-    progress: &Progress,
-    report: &mut Report,
-) -> Result<Frame> {
-    let begin = Instant::now();
-    let settings = encode_settings(args, panel)?;
-    let mut encoded = pipeline::frame(field, &panel.profile, &settings, progress)?;
-    encoded.frame.metadata.origin = origin.clone();
-    let (elapsed, did) = (begin.elapsed().as_secs_f64(), &encoded.report);
-    report.warn(did.warnings.iter());
-    report.add("encoding", did.method, "");
-    report.add("efficiency", did.efficiency, "");
-    report.add("encoding_field_error", did.field_error, "");
-    report.add("clipped", did.clipped, "");
-    report.add("dropped", did.dropped, "");
-    report.add("quantisation_error", did.quantisation_error, "");
-    report.add("unreachable", did.unreachable, "");
-    report.add(
-        "encode_seconds",
-        elapsed,
-        format!(
-            "encode       {:>8}  {}: efficiency {:.2} %, field error {:.3} in its band, {:.1} % of the light outside the band dropped",
-            seconds(elapsed),
-            did.method,
-            100.0 * did.efficiency,
-            did.field_error,
-            100.0 * did.dropped
-        ),
-    );
-    Ok(encoded.frame)
-}
-
-pub(super) fn encode(args: &EncodeArgs) -> Result<Report> {
-    let mut report = Report::new("encode");
-    let panel = panel(&args.panel, &mut report)?;
-    let pitch = [panel.grid.pitch_x, panel.grid.pitch_y];
-    let beside = npy::read_metadata(&args.input)?;
-    let wavelength = args.panel.wavelength.or(beside.as_ref().map(|m| m.wavelength)).unwrap_or(panel.wavelength);
-    let (field, metadata) = npy::read_field(&args.input, Some(pitch), Some(wavelength))?;
-    let bar = Bar::new();
-    let origin =
-        Origin { source: Some(args.input.display().to_string()), depth: metadata.content.depth, ..Origin::default() };
-    let frame = encode_field(&field, &args.encoding, &panel, &origin, &bar.progress, &mut report)?;
-    bar.progress.check()?;
-    frame.write(&args.output)?;
-    report.add("output", args.output.display().to_string(), format!("frame        {}", args.output.display()));
-    Ok(report)
-}
-
 /// A depth as it was typed: signed is z, unsigned lies on the side of the content.
-fn depth(text: &str, content: Option<[f64; 2]>) -> Result<f64> {
+pub(super) fn depth(text: &str, content: Option<[f64; 2]>) -> Result<f64> {
     let value = units::length(text)?;
     let signed = text.trim_start().starts_with(['+', '-']);
     let behind = content.is_some_and(|[near, far]| near + far < 0.0);

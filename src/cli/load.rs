@@ -10,7 +10,7 @@ use glam::DVec3;
 use holodrive::field::Grid;
 use holodrive::hologram::{HologramSettings, Method};
 use holodrive::illumination::{FormFactor, IlluminationSettings};
-use holodrive::panel::PanelProfile;
+use holodrive::panel::{PanelProfile, Wavefront, wavefront};
 use holodrive::pipeline::{self, Lit, SceneSettings};
 use holodrive::points::colour::Lasers;
 use holodrive::points::exposure::Exposure;
@@ -20,6 +20,7 @@ use holodrive::points::{Channel, Placement, PointCloud, images, ply};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::Picture;
 use holodrive::scene::gltf::{Choice, Clip, LoadOptions};
+use holodrive::units::show_length;
 use holodrive::{Error, Result};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -42,6 +43,31 @@ pub(super) fn panel(args: &PanelArgs, report: &mut Report) -> Result<Panel> {
     report.add("panel", profile.name.clone(), "");
     report.add("wavelength", wavelength, "");
     Ok(Panel { profile, grid, wavelength, lasers: None })
+}
+
+/// The wavefront correction of a panel: the file that was named, else the one of its profile that is for the wavelength.
+pub(super) fn panel_correction(panel: &Panel, named: Option<&str>, report: &mut Report) -> Result<Option<Wavefront>> {
+    let (profile, wavelength) = (&panel.profile, panel.wavelength);
+    let distance = |own: Option<f64>| own.map_or(f64::INFINITY, |own| (own - wavelength).abs());
+    let found = match named {
+        Some("none") => None,
+        Some(file) => Some(wavefront::read(Path::new(file), None)?),
+        // A file that does not fit the wavelength is passed over here: the profile may have none for this laser.
+        None => profile
+            .corrections
+            .iter()
+            .min_by(|a, b| distance(a.wavelength).total_cmp(&distance(b.wavelength)))
+            .filter(|c| c.wavelength.is_none_or(|own| (own - wavelength).abs() <= 0.1 * own))
+            .map(|c| wavefront::read(&c.file, c.wavelength))
+            .transpose()?,
+    };
+    if let Some(found) = &found {
+        report.warn(found.check(profile.width, profile.height, wavelength)?);
+        report.add("correction", found.name.clone(), format!("correction   {}", found.name));
+    } else if !profile.corrections.is_empty() && named.is_none() {
+        report.warn([format!("panel {}: no wavefront correction for {}", profile.name, show_length(wavelength))]);
+    }
+    Ok(found)
 }
 
 /// The panel in the light of one laser, or of three where they were asked for.

@@ -2,8 +2,11 @@
 
 mod args;
 mod bar;
+mod bench;
+mod calibrate;
 mod colour;
 mod commands;
+mod encoding;
 mod light;
 mod load;
 mod monitors;
@@ -38,9 +41,11 @@ pub(crate) fn main() -> ExitCode {
         Command::Points(args) => commands::points(&args),
         Command::Compute(args) => commands::compute(&args),
         Command::Propagate(args) => commands::propagate(&args),
-        Command::Encode(args) => commands::encode(&args),
+        Command::Encode(args) => encoding::encode(&args),
         Command::Reconstruct(args) => commands::reconstruct(&args),
         Command::Show(args) => show::show(&args),
+        Command::Bench { what } => bench::bench(&what),
+        Command::Calibrate { what } => calibrate::calibrate(&what),
         Command::Monitors(args) => monitors::monitors(&args),
         Command::Doctor(args) => monitors::doctor(&args),
     };
@@ -60,7 +65,7 @@ fn one_line(refused: &clap::Error) -> String {
     let words = first.join(" ");
     let words = words.strip_prefix("error: ").unwrap_or(&words);
     if refused.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return "holodrive: a command is needed: points, compute, propagate, encode, reconstruct, show, monitors or doctor (see holodrive --help)".into();
+        return "holodrive: a command is needed: points, compute, propagate, encode, reconstruct, show, calibrate, bench, monitors or doctor (see holodrive --help)".into();
     }
     format!("holodrive: {words} (see holodrive --help)")
 }

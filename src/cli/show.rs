@@ -3,7 +3,8 @@
 use super::args::{ShowArgs, White};
 use super::bar::Bar;
 use super::colour;
-use super::commands::{content, encode_field, origin, report_field, seen_half, write_traced, write_view};
+use super::commands::{content, origin, report_field, seen_half, write_traced, write_view};
+use super::encoding::encode_field;
 use super::load::{self, Input, Panel, Points, channel, hologram_settings, load_points, luminance_picture};
 use super::report::{Report, count, seconds};
 use glam::DVec2;

@@ -1,11 +1,12 @@
-//! The iterations of [`super::iterative`] as encodings of a field on the panel.
+//! The iterations of [`super::iterative`] as encodings of a field on the panel, or of pictures at depths.
 
 use super::iterative::{
-    GerchbergSaxton, GradientDescent, Padding, Solution, Start, Target, TargetPlane, gerchberg_saxton, gradient_descent,
+    Constraint, GerchbergSaxton, GradientDescent, Padding, Solution, Start, Target, TargetPlane, gerchberg_saxton,
+    gradient_descent,
 };
 use super::{DoublePhase, EncodedPattern, Interlace, band, double_phase};
-use crate::error::Result;
-use crate::field::Field;
+use crate::error::{Error, Result};
+use crate::field::{Complex32, Field};
 use crate::panel::{EncodingRecord, Illumination, Modulation, PanelProfile, Pattern};
 use crate::progress::Progress;
 use crate::propagation::{Aperture, propagate};
@@ -31,24 +32,73 @@ impl Default for BandGradient {
     }
 }
 
-/// Settings of the projections between planes.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PlaneProjections {
-    /// Depths at which the field's amplitudes should stand [m]: those of the scene. At least one.
-    pub depths: Vec<f64>,
-    /// The projections' own settings.
-    pub settings: GerchbergSaxton,
-    /// Whether the field's phase is the start, rather than `settings.start`.
-    pub warm: bool,
+/// How amplitudes on planes are reached.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlaneMethod {
+    /// Gerchberg & Saxton's projections as they are.
+    GerchbergSaxton,
+    /// With weights that even out what is too dark.
+    Weighted,
+    /// With amplitude and phase constrained: no speckle.
+    DoubleConstraint,
+    /// Gradient descent on the amplitudes.
+    Gradient,
 }
 
-impl Default for PlaneProjections {
-    fn default() -> Self {
-        Self {
-            depths: Vec::new(),
-            settings: GerchbergSaxton { iterations: 30, ..GerchbergSaxton::default() },
-            warm: true,
+impl PlaneMethod {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::GerchbergSaxton => "gerchberg-saxton",
+            Self::Weighted => "weighted",
+            Self::DoubleConstraint => "double-constraint",
+            Self::Gradient => "plane-gradient",
         }
+    }
+}
+
+/// The phases from which amplitudes on planes are sought.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PlaneStart {
+    /// The field's own: a warm start. For pictures as [`PlaneStart::Quadratic`].
+    Field,
+    /// The same everywhere.
+    Constant,
+    /// Random: speckle, and light from every part of the panel to every part of the picture.
+    Random {
+        /// The seed.
+        seed: u64,
+    },
+    /// A lens that spreads each point's light over about an eighth of the panel's side at the nearest plane: no speckle.
+    Quadratic,
+    /// Random, changing smoothly over 16 pixels.
+    Smooth {
+        /// The seed.
+        seed: u64,
+    },
+}
+
+/// Settings of the encodings by amplitudes on planes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlaneEncoding {
+    /// How.
+    pub method: PlaneMethod,
+    /// Depths z at which a field's amplitudes should stand [m]: those of the scene. At least one.
+    pub depths: Vec<f64>,
+    /// Number of iterations.
+    pub iterations: usize,
+    /// Share of the panel's light that pictures are asked to take; the rest is noise beside them (projections only).
+    pub efficiency: f64,
+    /// The first phases.
+    pub start: PlaneStart,
+    /// How the panel's borders are treated.
+    pub padding: Padding,
+}
+
+impl PlaneEncoding {
+    /// A method with 100 iterations; the start is the field's phase, for double constraints a lens.
+    pub fn new(method: PlaneMethod) -> Self {
+        let start = if method == PlaneMethod::DoubleConstraint { PlaneStart::Quadratic } else { PlaneStart::Field };
+        Self { method, depths: Vec::new(), iterations: 100, efficiency: 0.5, start, padding: Padding::Dark }
     }
 }
 
@@ -56,6 +106,7 @@ pub(super) fn gradient(
     field: &Field,
     settings: &BandGradient,
     profile: &PanelProfile,
+    illumination: Illumination,
     progress: &Progress,
 ) -> Result<EncodedPattern> {
     let start =
@@ -68,6 +119,7 @@ pub(super) fn gradient(
         step: settings.step,
         start: Start::Phase(made.pattern.values().to_vec()),
         padding: Padding::Periodic,
+        illumination,
     };
     let found = gradient_descent(&target, profile, field.wavelength, &descent, progress)?;
     let parameters = BTreeMap::from([
@@ -75,55 +127,141 @@ pub(super) fn gradient(
         ("iterations".to_owned(), json!(settings.iterations)),
         ("step".to_owned(), json!(settings.step)),
     ]);
-    Ok(encoded("gradient", made.target, found, Some(aperture), parameters, made.dropped, band::lost(made.dropped)))
+    let record = record("gradient", &found, Some(aperture), illumination, parameters);
+    let (dropped, warnings) = (made.dropped, band::lost(made.dropped));
+    let pattern = Pattern::Phase(found.pattern);
+    Ok(EncodedPattern { pattern, record, target: made.target, clipped: 0.0, dropped, warnings })
 }
 
-pub(super) fn projections(
+/// Amplitudes of a field at the depths of the settings.
+pub(super) fn of_field(
     field: &Field,
-    settings: &PlaneProjections,
+    settings: &PlaneEncoding,
     profile: &PanelProfile,
+    illumination: Illumination,
     progress: &Progress,
 ) -> Result<EncodedPattern> {
     if settings.depths.is_empty() {
-        let what = "gerchberg-saxton needs the depths at which the picture should stand";
-        return Err(crate::error::Error::parameter("depths", what));
+        let what = format!("{} needs the depths at which the picture should stand: --depths", settings.method.name());
+        return Err(Error::parameter("depths", what));
+    }
+    if settings.depths.len() > 64 {
+        return Err(Error::parameter("depths", format!("{} planes; at most 64", settings.depths.len())));
     }
     let mut planes = Vec::new();
     for &z in &settings.depths {
         let light = propagate(field, z, progress)?;
-        planes.push(TargetPlane { z, amplitude: light.samples.iter().map(|u| u.norm()).collect(), weight: None });
+        let phase = |u: &Complex32| u.im.atan2(u.re);
+        planes.push(TargetPlane {
+            z,
+            amplitude: light.samples.iter().map(|u| u.norm()).collect(),
+            weight: None,
+            // The field's own phase is the one that light at all depths has together.
+            phase: (settings.method == PlaneMethod::DoubleConstraint)
+                .then(|| light.samples.iter().map(phase).collect()),
+        });
     }
-    let mut own = settings.settings.clone();
-    if settings.warm {
-        own.start = Start::Phase(field.samples.iter().map(|u| u.im.atan2(u.re)).collect());
-    }
-    let found = gerchberg_saxton(&Target::Amplitude(planes), profile, field.wavelength, &own, progress)?;
-    let parameters = BTreeMap::from([
-        ("depths".to_owned(), json!(settings.depths)),
-        ("iterations".to_owned(), json!(own.iterations)),
-        ("weighting".to_owned(), json!(own.weighting)),
-    ]);
-    Ok(encoded("gerchberg-saxton", field.clone(), found, None, parameters, 0.0, Vec::new()))
+    let start = match settings.start {
+        PlaneStart::Field => Start::Phase(field.samples.iter().map(|u| u.im.atan2(u.re)).collect()),
+        other => start(other, &settings.depths, profile, field.wavelength),
+    };
+    let found = run(&Target::Amplitude(planes), settings, start, profile, field.wavelength, illumination, progress)?;
+    let record = record(settings.method.name(), &found, None, illumination, parameters(settings));
+    let pattern = Pattern::Phase(found.pattern);
+    Ok(EncodedPattern { pattern, record, target: field.clone(), clipped: 0.0, dropped: 0.0, warnings: Vec::new() })
 }
 
-fn encoded(
+/// Phases for wanted amplitudes on planes (the settings' depths are not looked at).
+pub(super) fn of_planes(
+    planes: Vec<TargetPlane>,
+    wavelength: f64,
+    settings: &PlaneEncoding,
+    profile: &PanelProfile,
+    illumination: Illumination,
+    progress: &Progress,
+) -> Result<(Solution, EncodingRecord)> {
+    let depths: Vec<f64> = planes.iter().map(|plane| plane.z).collect();
+    let first = match settings.start {
+        PlaneStart::Field => PlaneStart::Quadratic,
+        other => other,
+    };
+    let start = start(first, &depths, profile, wavelength);
+    let found = run(&Target::Amplitude(planes), settings, start, profile, wavelength, illumination, progress)?;
+    let settings = PlaneEncoding { depths, ..settings.clone() };
+    let record = record(settings.method.name(), &found, None, illumination, parameters(&settings));
+    Ok((found, record))
+}
+
+fn start(start: PlaneStart, depths: &[f64], profile: &PanelProfile, wavelength: f64) -> Start {
+    match start {
+        PlaneStart::Field | PlaneStart::Constant => Start::Constant,
+        PlaneStart::Random { seed } => Start::Random { seed },
+        PlaneStart::Smooth { seed } => Start::Smooth { seed, length: 16.0 },
+        PlaneStart::Quadratic => {
+            // A lens of focal length f magnifies the panel by 1 − z/f at depth z: f = −8·z makes it 9/8 as large. On the
+            // panel itself nothing spreads; then any lens does.
+            let nearest = depths.iter().map(|z| z.abs()).fold(f64::INFINITY, f64::min);
+            let least =
+                profile.width.max(profile.height) as f64 * profile.pitch_x.max(profile.pitch_y).powi(2) / wavelength;
+            Start::Quadratic { focal_length: (8.0 * nearest).max(least) }
+        }
+    }
+}
+
+fn run(
+    target: &Target,
+    settings: &PlaneEncoding,
+    start: Start,
+    profile: &PanelProfile,
+    wavelength: f64,
+    illumination: Illumination,
+    progress: &Progress,
+) -> Result<Solution> {
+    let (iterations, padding) = (settings.iterations, settings.padding);
+    if settings.method == PlaneMethod::Gradient {
+        let descent = GradientDescent { iterations, start, padding, illumination, ..GradientDescent::default() };
+        return gradient_descent(target, profile, wavelength, &descent, progress);
+    }
+    let projections = GerchbergSaxton {
+        iterations,
+        weighting: if settings.method == PlaneMethod::Weighted { 0.6 } else { 0.0 },
+        constraint: match settings.method {
+            PlaneMethod::DoubleConstraint => Constraint::AmplitudeAndPhase,
+            _ => Constraint::Amplitude,
+        },
+        efficiency: settings.efficiency,
+        start,
+        padding,
+        illumination,
+    };
+    gerchberg_saxton(target, profile, wavelength, &projections, progress)
+}
+
+fn parameters(settings: &PlaneEncoding) -> BTreeMap<String, Value> {
+    BTreeMap::from([
+        ("depths".to_owned(), json!(settings.depths)),
+        ("iterations".to_owned(), json!(settings.iterations)),
+        ("efficiency".to_owned(), json!(settings.efficiency)),
+        ("start".to_owned(), json!(format!("{:?}", settings.start))),
+    ])
+}
+
+fn record(
     method: &str,
-    target: Field,
-    found: Solution,
+    found: &Solution,
     aperture: Option<Aperture>,
+    illumination: Illumination,
     mut parameters: BTreeMap<String, Value>,
-    dropped: f64,
-    warnings: Vec<String>,
-) -> EncodedPattern {
+) -> EncodingRecord {
     let first_and_last = [found.history.first(), found.history.last()];
     parameters.insert("error".to_owned(), json!(first_and_last));
-    let record = EncodingRecord {
+    parameters.insert("rejected".to_owned(), json!(found.rejected));
+    EncodingRecord {
         method: method.into(),
         modulation: Modulation::Phase,
         parameters,
-        illumination: Illumination::Normal,
+        illumination,
         aperture,
         scale: if found.scale > 0.0 { 1.0 / found.scale } else { 1.0 },
-    };
-    EncodedPattern { pattern: Pattern::Phase(found.pattern), record, target, clipped: 0.0, dropped, warnings }
+    }
 }

@@ -13,11 +13,16 @@
 //! | [`Encoding::SingleSideBand`] | amplitude | the upper half of the panel's | 1/16 |
 //! | [`Encoding::ErrorDiffusion`] | phase | half the panel's by default | as double phase |
 //! | [`Encoding::Gradient`] | phase | half the panel's by default | what the best fit takes |
-//! | [`Encoding::GerchbergSaxton`] | phase | all | nearly all |
+//! | [`Encoding::Planes`] | phase | all | nearly all; as asked where light may be free |
 //! | [`Encoding::Cells`] | amplitude | a third or a quarter along x | 1/12 (Burckhardt), 1/16 (Lee) |
 //! | [`Encoding::Binary`] | amplitude, 1 bit | half the panel's along the carrier | 1/π² by threshold |
 //!
-//! The iterative ones are also functions of their own, for targets that are pictures: [`iterative`].
+//! The iterative ones also take pictures at depths for targets: [`pictures`], [`iterative`].
+//!
+//! *Placement.* A phase pattern may be made for light that falls on the panel obliquely or from a point
+//! ([`EncodeSettings::illumination`]): in straight light it then carries a blaze or a lens of its own, and what dead space
+//! and curve errors leave unmodulated goes another way than the object. [`EncodeSettings::stop`] keeps the object's own
+//! light out of a disc about the axis, where a stop for the zero order stands.
 
 pub mod band;
 pub mod binary;
@@ -28,19 +33,21 @@ mod iterated;
 pub mod iterative;
 pub mod kinoform;
 pub mod off_axis;
+pub mod pictures;
 
 pub use binary::{Binarisation, BinaryFringe};
 pub use cells::{Cell, CellHologram};
 pub use double_phase::{DoublePhase, Interlace};
 pub use error_diffusion::ErrorDiffusion;
-pub use iterated::{BandGradient, PlaneProjections};
+pub use iterated::{BandGradient, PlaneEncoding, PlaneMethod, PlaneStart};
 pub use off_axis::{OffAxis, Reference};
 
 use crate::error::{Error, Result};
-use crate::field::{Complex64, Field};
+use crate::field::{Complex32, Complex64, Field};
 use crate::panel::simulated::illuminate;
-use crate::panel::{EncodingRecord, Frame, Modulation, PanelProfile, Pattern, Wavefront, drive};
+use crate::panel::{EncodingRecord, Frame, Illumination, Modulation, PanelProfile, Pattern, Wavefront, drive};
 use crate::progress::Progress;
+use crate::propagation::Aperture;
 use rayon::prelude::*;
 
 /// The ways from a complex field to what a panel can show.
@@ -60,8 +67,8 @@ pub enum Encoding {
     ErrorDiffusion(ErrorDiffusion),
     /// Phases found by gradient descent, so that the field within a band comes out as a complex field.
     Gradient(BandGradient),
-    /// Phases found by projections between planes on which the field's amplitudes should stand.
-    GerchbergSaxton(PlaneProjections),
+    /// Phases found so that the field's amplitudes stand on planes, whatever their phases there.
+    Planes(PlaneEncoding),
     /// Amplitudes of neighbouring columns whose light has different phases along the carrier.
     Cells(CellHologram),
     /// Fringes of two amplitudes.
@@ -70,7 +77,7 @@ pub enum Encoding {
 
 impl Encoding {
     /// Names as the command line and metadata write them.
-    pub const NAMES: [&'static str; 13] = [
+    pub const NAMES: [&'static str; 16] = [
         "double-phase",
         "kinoform",
         "off-axis-bipolar",
@@ -78,7 +85,10 @@ impl Encoding {
         "single-side-band",
         "error-diffusion",
         "gradient",
+        "plane-gradient",
         "gerchberg-saxton",
+        "weighted",
+        "double-constraint",
         "burckhardt",
         "lee",
         "binary-threshold",
@@ -91,6 +101,7 @@ impl Encoding {
     /// # Errors
     /// [`Error::Parameter`] that lists the names.
     pub fn named(name: &str) -> Result<Self> {
+        let planes = |method| Self::Planes(PlaneEncoding::new(method));
         let binary = |method| Self::Binary(BinaryFringe::new(method));
         Ok(match name {
             "double-phase" => Self::DoublePhase(DoublePhase::default()),
@@ -100,7 +111,10 @@ impl Encoding {
             "single-side-band" => Self::SingleSideBand(OffAxis::default()),
             "error-diffusion" => Self::ErrorDiffusion(ErrorDiffusion::default()),
             "gradient" => Self::Gradient(BandGradient::default()),
-            "gerchberg-saxton" => Self::GerchbergSaxton(PlaneProjections::default()),
+            "plane-gradient" => planes(PlaneMethod::Gradient),
+            "gerchberg-saxton" => planes(PlaneMethod::GerchbergSaxton),
+            "weighted" => planes(PlaneMethod::Weighted),
+            "double-constraint" => planes(PlaneMethod::DoubleConstraint),
             "burckhardt" => Self::Cells(CellHologram { cell: Cell::Burckhardt, percentile: 0.999 }),
             "lee" => Self::Cells(CellHologram { cell: Cell::Lee, percentile: 0.999 }),
             "binary-threshold" => binary(Binarisation::Threshold),
@@ -123,7 +137,7 @@ impl Encoding {
             Self::SingleSideBand(_) => "single-side-band",
             Self::ErrorDiffusion(_) => "error-diffusion",
             Self::Gradient(_) => "gradient",
-            Self::GerchbergSaxton(_) => "gerchberg-saxton",
+            Self::Planes(settings) => settings.method.name(),
             Self::Cells(settings) => settings.cell.name(),
             Self::Binary(settings) => settings.method.name(),
         }
@@ -132,11 +146,9 @@ impl Encoding {
     /// What its pattern modulates.
     pub fn modulation(&self) -> Modulation {
         match self {
-            Self::DoublePhase(_)
-            | Self::Kinoform
-            | Self::ErrorDiffusion(_)
-            | Self::Gradient(_)
-            | Self::GerchbergSaxton(_) => Modulation::Phase,
+            Self::DoublePhase(_) | Self::Kinoform | Self::ErrorDiffusion(_) | Self::Gradient(_) | Self::Planes(_) => {
+                Modulation::Phase
+            }
             Self::OffAxisBipolar(_)
             | Self::OffAxisIntensity(_)
             | Self::SingleSideBand(_)
@@ -153,12 +165,38 @@ pub struct EncodeSettings {
     pub encoding: Encoding,
     /// The panel's wavefront correction.
     pub correction: Option<Wavefront>,
+    /// The wave that falls on the panel (phase encodings; fringes have their reference wave): see [`blaze_and_lens`].
+    pub illumination: Illumination,
+    /// Radius of the disc of spatial frequencies about the axis that the object's light keeps out of [cycles/m]; 0: none.
+    pub stop: f64,
 }
 
 impl EncodeSettings {
     /// An encoding without correction.
     pub fn new(encoding: Encoding) -> Self {
-        Self { encoding, correction: None }
+        Self { encoding, correction: None, illumination: Illumination::Normal, stop: 0.0 }
+    }
+}
+
+/// The wave for which a pattern must be made, so that in straight light it sends its object aside by the angles θ_x and θ_y
+/// [rad] (a blaze) and focuses it by a lens of that focal length [m] (negative: spreads it).
+///
+/// # Errors
+/// [`Error::Parameter`] for angles of a right angle or more, or a focal length that is zero or not finite.
+pub fn blaze_and_lens(angles: [f64; 2], focal_length: Option<f64>, wavelength: f64) -> Result<Illumination> {
+    let sines = angles.map(f64::sin);
+    if angles.iter().any(|a| !(a.abs() < std::f64::consts::FRAC_PI_2)) || sines[0].hypot(sines[1]) >= 1.0 {
+        return Err(Error::parameter("blaze", format!("{angles:?} rad: no light runs in that direction")));
+    }
+    match focal_length {
+        None if angles == [0.0, 0.0] => Ok(Illumination::Normal),
+        None => Ok(Illumination::Plane { frequency: sines.map(|sine| -sine / wavelength) }),
+        Some(length) if length.is_finite() && length != 0.0 => {
+            // From a point behind the panel (or towards one before it) in the direction that the blaze turns away.
+            let axial = (1.0 - sines[0].powi(2) - sines[1].powi(2)).sqrt();
+            Ok(Illumination::Point { position: [length * sines[0], length * sines[1], -length * axial] })
+        }
+        Some(length) => Err(Error::parameter("lens", format!("{length} m must be finite and not zero"))),
     }
 }
 
@@ -249,7 +287,7 @@ pub fn encode(
     let profile = amplitude.as_ref().unwrap_or(profile);
     let grid = profile.grid()?;
     crate::panel::drive::fit(field.grid, profile)?;
-    let made = pattern(field, encoding, profile, progress)?;
+    let made = lit_pattern(field, settings, profile, progress)?;
     progress.start("drive levels", grid.height as u64);
     let mut driven = drive(&made.pattern, settings.correction.as_ref(), profile)?;
     warnings.extend(made.warnings);
@@ -274,10 +312,7 @@ pub fn encode(
     Ok(Encoded { frame, report })
 }
 
-/// The pattern of an encoding before it meets the panel's levels, with the field that it stands for.
-///
-/// Only error diffusion and the iterations look at the profile's levels here, because their later pixels or steps make
-/// up for what the earlier could not show.
+/// The pattern of an encoding before it meets the panel's levels, in straight light, with the field that it stands for.
 ///
 /// # Errors
 /// As [`encode`].
@@ -285,6 +320,66 @@ pub fn pattern(
     field: &Field,
     encoding: &Encoding,
     profile: &PanelProfile,
+    progress: &Progress,
+) -> Result<EncodedPattern> {
+    lit_pattern(field, &EncodeSettings::new(encoding.clone()), profile, progress)
+}
+
+/// The same for the light and the stop of the settings.
+///
+/// Only error diffusion and the iterations look at the profile's levels here, because their later pixels or steps make
+/// up for what the earlier could not show.
+fn lit_pattern(
+    field: &Field,
+    settings: &EncodeSettings,
+    profile: &PanelProfile,
+    progress: &Progress,
+) -> Result<EncodedPattern> {
+    let illumination = settings.illumination;
+    if illumination != Illumination::Normal && settings.encoding.modulation() == Modulation::Amplitude {
+        let what = format!("{} has a reference wave instead: --reference-angle", settings.encoding.name());
+        return Err(Error::parameter("blaze, lens", what));
+    }
+    let mut incident = vec![Complex32::new(1.0, 0.0); field.samples.len()];
+    illuminate(&mut incident, field.grid, field.wavelength, illumination)?;
+    let stopped = (settings.stop > 0.0).then(|| {
+        let all = Aperture::centered(f64::INFINITY, f64::INFINITY);
+        band::limit(field, &Aperture { stop: settings.stop, ..all })
+    });
+    let (kept, lost) = stopped.as_ref().map_or((field, 0.0), |(field, lost)| (field, *lost));
+    let mut made = straight_pattern(kept, &settings.encoding, (profile, illumination, &incident), progress)?;
+    if settings.stop > 0.0 {
+        let whole = Aperture::centered(field.grid.limit_x() * 1.01, field.grid.limit_y() * 1.01);
+        made.record.aperture.get_or_insert(whole).stop = settings.stop;
+        made.dropped = 1.0 - (1.0 - made.dropped) * (1.0 - lost);
+        if lost > 0.1 {
+            made.warnings.push(format!("{:.0} % of the light lies within the stop and is lost", 100.0 * lost));
+        }
+    }
+    if illumination != Illumination::Normal {
+        made.record.illumination = illumination;
+        if let (Illumination::Plane { frequency }, Some(aperture)) = (illumination, &made.record.aperture) {
+            let limits = [field.grid.limit_x(), field.grid.limit_y()];
+            if (0..2).any(|axis| frequency[axis].abs() + aperture.half[axis] > limits[axis] * (1.0 + 1e-6)) {
+                made.warnings.push(
+                    "blaze and object together pass half a cycle a pixel: part of the object comes out in another order"
+                        .into(),
+                );
+            }
+            if (0..2).all(|axis| frequency[axis].abs() <= aperture.half[axis]) {
+                made.warnings
+                    .push("the blaze is less than the object's band: the zero order lies in the picture".into());
+            }
+        }
+    }
+    Ok(made)
+}
+
+/// The pattern for an incident wave: encodings that do not look at levels are made for straight light and turned.
+fn straight_pattern(
+    field: &Field,
+    encoding: &Encoding,
+    (profile, illumination, incident): (&PanelProfile, Illumination, &[Complex32]),
     progress: &Progress,
 ) -> Result<EncodedPattern> {
     use off_axis::Fringe;
@@ -296,7 +391,7 @@ pub fn pattern(
         return Err(Error::parameter("field", "it is dark everywhere; there is nothing to encode"));
     }
     progress.start(encoding.name(), 2);
-    match encoding {
+    let mut made = match encoding {
         Encoding::DoublePhase(settings) => double_phase::pattern(field, settings, progress),
         Encoding::Kinoform => kinoform::pattern(field),
         Encoding::OffAxisBipolar(settings) => off_axis::pattern(field, settings, Fringe::Bipolar, progress),
@@ -304,29 +399,40 @@ pub fn pattern(
         Encoding::SingleSideBand(settings) => off_axis::pattern(field, settings, Fringe::SingleSideBand, progress),
         Encoding::ErrorDiffusion(settings) => {
             let curve = profile.drive_curve(field.wavelength)?.0;
-            error_diffusion::pattern(field, settings, &curve, progress)
+            return error_diffusion::pattern(field, settings, &curve, incident, progress);
         }
-        Encoding::Gradient(settings) => iterated::gradient(field, settings, profile, progress),
-        Encoding::GerchbergSaxton(settings) => iterated::projections(field, settings, profile, progress),
+        Encoding::Gradient(settings) => {
+            return iterated::gradient(field, settings, profile, illumination, progress);
+        }
+        Encoding::Planes(settings) => {
+            return iterated::of_field(field, settings, profile, illumination, progress);
+        }
         Encoding::Cells(settings) => cells::pattern(field, settings, progress),
         Encoding::Binary(settings) => binary::pattern(field, settings, progress),
+    }?;
+    if let (Pattern::Phase(pattern), false) = (&mut made.pattern, illumination == Illumination::Normal) {
+        let turn = |(phase, wave): (&mut f32, &Complex32)| *phase -= wave.im.atan2(wave.re);
+        pattern.phase.par_iter_mut().zip(incident).for_each(turn);
     }
+    Ok(made)
 }
 
 /// The field behind the panel as the record has it lit, the correction taken for the bend that it undoes.
 fn shown(frame: &Frame, correction: Option<&Wavefront>, record: &EncodingRecord) -> Result<Field> {
     let profile = &frame.metadata.panel;
     let wavelength = frame.metadata.wavelength;
-    let (curve, _) = profile.drive_curve(wavelength)?;
-    let table: Vec<Complex64> = (0..curve.levels()).map(|l| curve.phasor(l as u16)).collect();
-    let mut samples: Vec<_> = frame
-        .levels
-        .par_iter()
+    let (curve, _) = profile.pixel_curve(wavelength)?;
+    let modulation = curve.modulation();
+    let mut samples: Vec<_> = curve
+        .values(&frame.levels, frame.width)?
+        .into_par_iter()
         .enumerate()
-        .map(|(i, &level)| {
-            let u = table[usize::from(level)];
-            let u = correction.map_or(u, |c| u * Complex64::cis(-f64::from(c.phase[i])));
-            num_complex::Complex32::new(u.re as f32, u.im as f32)
+        .map(|(i, value)| match modulation {
+            Modulation::Amplitude => Complex32::new(value, 0.0),
+            Modulation::Phase => {
+                let phase = f64::from(value) - correction.map_or(0.0, |c| f64::from(c.phase[i]));
+                Complex32::new(phase.cos() as f32, phase.sin() as f32)
+            }
         })
         .collect();
     let grid = profile.grid()?;

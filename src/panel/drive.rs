@@ -2,7 +2,8 @@
 
 use super::frame::{Applied, Frame, FrameMetadata};
 use super::profile::PanelProfile;
-use super::response::{DriveCurve, Modulation};
+use super::regional::PixelCurve;
+use super::response::Modulation;
 use super::wavefront::Wavefront;
 use super::{FringePattern, PhasePattern};
 use crate::error::{Error, Result};
@@ -85,7 +86,7 @@ pub fn drive(pattern: &Pattern, correction: Option<&Wavefront>, profile: &PanelP
         };
         return Err(Error::parameter("pattern", what));
     }
-    let (curve, mut warnings) = profile.drive_curve(wavelength)?;
+    let (curve, mut warnings) = profile.pixel_curve(wavelength)?;
     warnings.extend(profile.warnings());
     if let Some(correction) = correction {
         if profile.modulation() == Modulation::Amplitude {
@@ -127,8 +128,7 @@ pub fn correct(frame: &Frame, correction: &Wavefront) -> Result<Driven> {
         return Err(Error::parameter("correction", what));
     }
     let profile = &frame.metadata.panel;
-    let (curve, _) = profile.drive_curve(frame.metadata.wavelength)?;
-    let phase = frame.levels.iter().map(|&l| curve.values()[usize::from(l).min(curve.levels() - 1)] as f32).collect();
+    let phase = profile.pixel_curve(frame.metadata.wavelength)?.0.values(&frame.levels, frame.width)?;
     let pattern = PhasePattern::new(profile.grid()?, frame.metadata.wavelength, phase)?;
     let mut driven = drive(&Pattern::Phase(pattern), Some(correction), profile)?;
     driven.frame.metadata.encoding = frame.metadata.encoding.clone();
@@ -170,7 +170,7 @@ pub(crate) struct Levels {
 }
 
 /// Nearest level of each wish (+ correction); rows in parallel, sums in row order.
-pub(crate) fn quantise(wishes: &[f32], correction: Option<&[f32]>, curve: &DriveCurve, width: usize) -> Levels {
+pub(crate) fn quantise(wishes: &[f32], correction: Option<&[f32]>, curve: &PixelCurve, width: usize) -> Levels {
     let mut levels = vec![0; wishes.len()];
     let rows: Vec<(f64, usize)> = levels
         .par_chunks_mut(width)
@@ -180,10 +180,10 @@ pub(crate) fn quantise(wishes: &[f32], correction: Option<&[f32]>, curve: &Drive
             for (i, level) in levels.iter_mut().enumerate() {
                 let at = row * width + i;
                 let wish = f64::from(wishes[at]) + correction.map_or(0.0, |c| f64::from(c[at]));
-                let (nearest, miss) = curve.nearest(wish);
+                let (nearest, miss) = curve.nearest(i, row, wish);
                 *level = nearest;
                 squares += miss * miss;
-                unreachable += usize::from(curve.unreachable(miss));
+                unreachable += usize::from(curve.mean.unreachable(miss));
             }
             (squares, unreachable)
         })

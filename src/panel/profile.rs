@@ -2,6 +2,7 @@
 
 use super::packing::SignalLayout;
 use super::profile_file;
+use super::regional::PixelCurve;
 use super::response::{Curve, DriveCurve, Modulation, PhaseSign, Response};
 use crate::error::{Error, Result};
 use crate::field::Grid;
@@ -31,6 +32,15 @@ impl PanelKind {
             Self::Amplitude | Self::BinaryDmd => Modulation::Amplitude,
         }
     }
+}
+
+/// A file with the wavefront correction of a panel ([`super::wavefront::read`]).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CorrectionFile {
+    /// The file.
+    pub file: PathBuf,
+    /// Wavelength at which it holds [m]; absent: the one that the file says.
+    pub wavelength: Option<f64>,
 }
 
 /// A panel's profile: read from `calib/*.toml` or from the user's file, all lengths in metres.
@@ -72,6 +82,9 @@ pub struct PanelProfile {
     pub refresh: Option<f64>,
     /// Start of the monitor name or serial in its EDID, by which it is found among monitors.
     pub edid: Option<String>,
+    /// Files of wavefront corrections.
+    #[serde(default)]
+    pub corrections: Vec<CorrectionFile>,
     /// Keys whose values come from memory or one secondary source.
     pub unverified: Vec<String>,
 }
@@ -151,6 +164,19 @@ impl PanelProfile {
     /// # Errors
     /// [`Error::Calibration`] when every curve was measured further away than that.
     pub fn drive_curve(&self, wavelength: f64) -> Result<(DriveCurve, Vec<String>)> {
+        let (nearest, measured_at, warnings) = self.response_for(wavelength)?;
+        Ok((nearest.curve.resolve(self.levels(), wavelength, measured_at, self.phase_sign), warnings))
+    }
+
+    /// The same for each pixel: regions of a panel may have curves of their own.
+    pub fn pixel_curve(&self, wavelength: f64) -> Result<(PixelCurve, Vec<String>)> {
+        let (nearest, measured_at, warnings) = self.response_for(wavelength)?;
+        let (levels, size) = (self.levels(), (self.width, self.height));
+        Ok((nearest.curve.resolve_pixels(levels, size, wavelength, measured_at, self.phase_sign), warnings))
+    }
+
+    /// The response nearest to a wavelength, where it was measured if elsewhere, and warnings.
+    fn response_for(&self, wavelength: f64) -> Result<(&Response, Option<f64>, Vec<String>)> {
         /// Lasers drift and labels round by less than this [m].
         const SAME: f64 = 1e-9;
         /// Dispersion of a nematic liquid crystal bends a curve by several per cent over this relative distance.
@@ -177,7 +203,7 @@ impl PanelProfile {
                 self.name
             ));
         }
-        Ok((nearest.curve.resolve(self.levels(), wavelength, measured_at, self.phase_sign), warnings))
+        Ok((nearest, measured_at, warnings))
     }
 
     /// An ideal amplitude modulator with the same pixels, levels and signal: this liquid crystal between polarisers.

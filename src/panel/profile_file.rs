@@ -1,14 +1,15 @@
 //! Panel profiles as TOML: the file's keys, their units and their domains.
 
 use super::packing::{Packing, SignalLayout};
-use super::profile::{PanelKind, PanelProfile};
+use super::profile::{CorrectionFile, PanelKind, PanelProfile};
 use super::response::{Curve, Modulation, PhaseSign, Response};
+use super::vendor;
 use crate::error::{Error, Result};
 use crate::units;
 use serde::{Deserialize, Deserializer, de};
 use std::f64::consts::{PI, TAU};
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Every profile of `calib/`, by name.
 pub(super) const EMBEDDED: &[(&str, &str)] = &[
@@ -73,7 +74,16 @@ struct ProfileFile {
     #[serde(default)]
     unverified: Vec<String>,
     signal: Option<SignalFile>,
+    #[serde(default)]
+    correction: Vec<CorrectionEntry>,
     response: Vec<ResponseFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CorrectionEntry {
+    file: PathBuf,
+    wavelength: Option<Quantity>,
 }
 
 /// Dead space is taken to reflect as well as the active area, the worst case, where a profile does not say.
@@ -105,6 +115,12 @@ enum CurveKind {
     Polynomial,
     Piston,
     Amplitude,
+    LevelTable,
+    Regional,
+    /// A vendor's file of phases and levels.
+    HamamatsuLut,
+    /// A vendor's controller table, loaded here instead of there.
+    MeadowlarkLut,
 }
 
 #[derive(Deserialize)]
@@ -117,6 +133,11 @@ struct ResponseFile {
     values: Option<Vec<f64>>,
     coefficients: Option<Vec<f64>>,
     heights: Option<Vec<Quantity>>,
+    levels: Option<Vec<u16>>,
+    regions: Option<[usize; 2]>,
+    polynomials: Option<Vec<Vec<f64>>>,
+    tables: Option<Vec<Vec<f64>>>,
+    file: Option<PathBuf>,
 }
 
 /// Turns a reader's error into one about the key and the file.
@@ -136,6 +157,10 @@ impl At<'_> {
             };
             Error::calibration(self.source, format!("{key}: {what}"))
         })
+    }
+    /// A file that is named beside the profile.
+    fn beside(&self, file: &Path) -> PathBuf {
+        self.source.parent().map_or_else(|| file.to_path_buf(), |folder| folder.join(file))
     }
     fn share(&self, key: &str, value: f64, low_is_out: bool) -> Result<f64> {
         let good = value <= 1.0 && if low_is_out { value > 0.0 } else { value >= 0.0 };
@@ -191,6 +216,7 @@ pub(super) fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
         "refresh",
         "edid",
         "signal",
+        "correction",
         "response",
     ];
     if let Some(stray) = file.unverified.iter().find(|key| !keys.contains(&key.as_str())) {
@@ -203,6 +229,15 @@ pub(super) fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
     }
     let responses = file.response.iter().map(|r| response(&at, r, modulation, levels)).collect::<Result<Vec<_>>>()?;
     let signal = signal(&at, file.signal, file.width, file.height, file.bits)?;
+    let correction = |entry: &CorrectionEntry| {
+        let read = |text| at.read("correction.wavelength", text, units::positive_length);
+        let wavelength = entry.wavelength.as_ref().map(read).transpose()?;
+        Ok(CorrectionFile { file: at.beside(&entry.file), wavelength })
+    };
+    let corrections = file.correction.iter().map(correction).collect::<Result<Vec<_>>>()?;
+    if !corrections.is_empty() && modulation == Modulation::Amplitude {
+        return at.refuse("a [[correction]] needs a panel that modulates phase");
+    }
     Ok(PanelProfile {
         source: source.to_path_buf(),
         name: file.name,
@@ -222,6 +257,7 @@ pub(super) fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
         settle_time: file.settle_time.map(|t| at.read("settle_time", &t, units::duration)).transpose()?,
         refresh: file.refresh.map(|t| at.read("refresh", &t, units::frequency)).transpose()?,
         edid: file.edid,
+        corrections,
         unverified: file.unverified,
     })
 }
@@ -270,18 +306,41 @@ fn response(at: &At<'_>, file: &ResponseFile, modulation: Modulation, levels: us
                 .map(|text| at.read("response.heights", text, units::length))
                 .collect::<Result<_>>()?,
         },
+        CurveKind::LevelTable => Curve::LevelTable { output: need(at, &file.levels, "levels")? },
+        CurveKind::Regional => {
+            let [columns, rows] = need(at, &file.regions, "regions")?;
+            let unit = radians()?;
+            let curves = match (&file.polynomials, &file.tables) {
+                (Some(each), None) => {
+                    let curve = |c: &Vec<f64>| Curve::Polynomial { coefficients: scaled(c.clone(), unit) };
+                    each.iter().map(curve).collect()
+                }
+                (None, Some(each)) => {
+                    each.iter().map(|phase| Curve::Table { phase: scaled(phase.clone(), unit) }).collect()
+                }
+                _ => return at.refuse("a regional response needs response.polynomials or response.tables"),
+            };
+            Curve::Regional { columns, rows, curves }
+        }
+        CurveKind::HamamatsuLut => vendor::hamamatsu_lut(&at.beside(&need(at, &file.file, "file")?), levels)?,
+        CurveKind::MeadowlarkLut => {
+            Curve::LevelTable { output: vendor::meadowlark_lut(&at.beside(&need(at, &file.file, "file")?))?.output }
+        }
         CurveKind::Amplitude => match &file.values {
             Some(values) => Curve::Transmittance { amplitude: values.clone() },
             None => Curve::LinearAmplitude,
         },
     };
     // Keys of another kind of curve would be silently without effect.
-    let used = match file.kind {
-        CurveKind::Linear => [true, false, false, false, false],
-        CurveKind::Table => [false, true, true, false, false],
-        CurveKind::Polynomial => [false, true, false, true, false],
-        CurveKind::Piston => [false, false, false, false, true],
-        CurveKind::Amplitude => [false, false, true, false, false],
+    let used: &[&str] = match file.kind {
+        CurveKind::Linear => &["levels_for_2pi"],
+        CurveKind::Table => &["unit", "values"],
+        CurveKind::Polynomial => &["unit", "coefficients"],
+        CurveKind::Piston => &["heights"],
+        CurveKind::Amplitude => &["values"],
+        CurveKind::LevelTable => &["levels"],
+        CurveKind::Regional => &["unit", "regions", "polynomials", "tables"],
+        CurveKind::HamamatsuLut | CurveKind::MeadowlarkLut => &["file"],
     };
     let given = [
         ("levels_for_2pi", file.levels_for_2pi.is_some()),
@@ -289,8 +348,13 @@ fn response(at: &At<'_>, file: &ResponseFile, modulation: Modulation, levels: us
         ("values", file.values.is_some()),
         ("coefficients", file.coefficients.is_some()),
         ("heights", file.heights.is_some()),
+        ("levels", file.levels.is_some()),
+        ("regions", file.regions.is_some()),
+        ("polynomials", file.polynomials.is_some()),
+        ("tables", file.tables.is_some()),
+        ("file", file.file.is_some()),
     ];
-    if let Some(((key, _), _)) = given.iter().zip(used).find(|((_, given), used)| *given && !used) {
+    if let Some((key, _)) = given.iter().find(|(key, given)| *given && !used.contains(key)) {
         return at.refuse(format!("response.{key} does not belong to this kind of curve; remove it"));
     }
     if curve.modulation() != modulation {
@@ -327,6 +391,55 @@ mod tests {
         assert_eq!((generic.width, generic.height, generic.bits), (1920, 1080, 8));
         assert_eq!((generic.pitch_x, generic.pitch_y, generic.default_wavelength()), (8e-6, 8e-6, 632.8e-9));
         assert_eq!(generic.drive_curve(450e-9).expect("curve").0.nearest(PI).0, 128);
+    }
+
+    #[test]
+    fn a_written_profile_is_read_back_the_same() {
+        for (name, text) in EMBEDDED {
+            let profile = PanelProfile::parse(text, Path::new(name)).expect(name);
+            let again = PanelProfile::parse(&profile.to_toml(&["remark".into()]), Path::new(name)).expect(name);
+            assert_eq!(again, profile, "{name}");
+        }
+        let mut profile = PanelProfile::generic().expect("generic");
+        profile.name = "with \"quotes\" and \\".into();
+        profile.source = "x.toml".into();
+        profile.pitch_y = 6.4e-6;
+        profile.phase_sign = PhaseSign::Decreasing;
+        profile.settle_time = Some(0.0123456789);
+        profile.corrections = vec![CorrectionFile { file: "flat.npy".into(), wavelength: Some(532.123456789e-9) }];
+        let polynomial = |range: f64| Curve::Polynomial { coefficients: vec![0.0, range, 0.1] };
+        let curves = vec![polynomial(6.0), polynomial(6.1), polynomial(6.2)];
+        profile.responses = vec![
+            Response { wavelength: Some(532e-9), curve: Curve::Regional { columns: 3, rows: 1, curves } },
+            Response { wavelength: Some(640e-9), curve: polynomial(5.5) },
+            Response { wavelength: None, curve: Curve::LevelTable { output: (0..128).map(|g| 2 * g).collect() } },
+        ];
+        let again = PanelProfile::parse(&profile.to_toml(&[]), Path::new("x.toml")).expect("read");
+        assert_eq!(again, profile);
+    }
+
+    #[test]
+    fn vendor_tables_named_in_a_profile_are_applied() {
+        let folder = tempfile::tempdir().expect("folder");
+        let table: String = (0..256).map(|g| format!("{g} {}\n", 20 + g * 4 / 5)).collect();
+        std::fs::write(folder.path().join("slm.lut"), &table).expect("write");
+        let linear = "kind = \"linear\"\nlevels_for_2pi = 256";
+        let text = EMBEDDED[0].1.replace(linear, "kind = \"meadowlark-lut\"\nfile = \"slm.lut\"");
+        let path = folder.path().join("mine.toml");
+        std::fs::write(&path, &text).expect("write");
+        let profile = PanelProfile::read(&path).expect("profile");
+        let (curve, _) = profile.drive_curve(633e-9).expect("curve");
+        // Gray 128 is half a turn and goes out as 20 + 102.
+        assert_eq!(curve.nearest(PI).0, 122);
+        let lut: String = (0..128).map(|i| format!("{}\t{}\n", f64::from(i) / 64.0, f64::from(i) * 1.7)).collect();
+        std::fs::write(folder.path().join("slm.lut"), &lut).expect("write");
+        std::fs::write(&path, text.replace("meadowlark", "hamamatsu")).expect("write");
+        let (curve, _) = PanelProfile::read(&path).expect("profile").drive_curve(633e-9).expect("curve");
+        // π at line 64: level 108.8.
+        assert_eq!(curve.nearest(PI).0, 109);
+        std::fs::write(folder.path().join("slm.lut"), "0 0\n1 x\n").expect("write");
+        let error = PanelProfile::read(&path).expect_err("damaged").to_string();
+        assert!(error.contains("slm.lut") && error.contains("line 2"), "{error}");
     }
 
     #[test]

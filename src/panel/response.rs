@@ -1,5 +1,6 @@
 //! Drive level → modulation: what a panel does to light at each of its levels, and which level comes nearest to a wish.
 
+use super::regional::PixelCurve;
 use crate::error::{Error, Result};
 use crate::field::Complex64;
 use serde::{Deserialize, Serialize};
@@ -49,6 +50,20 @@ pub enum Curve {
         /// Height of each level [m].
         height: Vec<f64>,
     },
+    /// A controller's table: gray g of n, asked for phase 2πg/n, is sent to the head as level `output[g]`.
+    LevelTable {
+        /// Level for each gray.
+        output: Vec<u16>,
+    },
+    /// Curves of `columns × rows` equal rectangles of the panel, row by row from the upper left ([`super::regional`]).
+    Regional {
+        /// Rectangles side by side.
+        columns: usize,
+        /// Rectangles one above the other.
+        rows: usize,
+        /// One curve each: all tables or all polynomials, which all rise or all fall.
+        curves: Vec<Curve>,
+    },
     /// Amplitude transmittance of each level, 0 … 1.
     Transmittance {
         /// Amplitude transmittance of each level.
@@ -80,6 +95,20 @@ impl Curve {
                 };
             }
             Self::LinearAmplitude => return Ok(()),
+            Self::LevelTable { output } => {
+                let greatest = output.iter().copied().max().map_or(0, usize::from);
+                return if output.len() < 2 {
+                    refuse("the level table has no lines".into())
+                } else if greatest >= levels {
+                    refuse(format!(
+                        "the level table goes up to {greatest}, the panel has levels 0 … {}: load such a table into the head's controller",
+                        levels - 1
+                    ))
+                } else {
+                    Ok(())
+                };
+            }
+            Self::Regional { columns, rows, curves } => return check_regions(*columns, *rows, curves, levels, path),
             Self::Polynomial { coefficients } => {
                 if coefficients.len() < 2 || coefficients.iter().any(|c| !c.is_finite()) {
                     return refuse("response.coefficients needs two or more finite numbers".into());
@@ -130,8 +159,41 @@ impl Curve {
                 })
                 .collect(),
             Self::Piston { height } => height.iter().map(|h| 4.0 * PI * h / wavelength).collect(),
+            Self::LevelTable { output } => table_phases(output, levels),
+            Self::Regional { curves, .. } => {
+                let each: Vec<Vec<f64>> = curves.iter().map(|curve| curve.phases(levels, wavelength)).collect();
+                (0..levels).map(|l| each.iter().map(|phases| phases[l]).sum::<f64>() / each.len() as f64).collect()
+            }
             Self::Transmittance { .. } | Self::LinearAmplitude => Vec::new(),
         }
+    }
+
+    /// The phases of each region's levels, for [`Curve::Regional`].
+    fn region_phases(&self, levels: usize, wavelength: f64) -> Option<((usize, usize), Vec<Vec<f64>>)> {
+        match self {
+            Self::Regional { columns, rows, curves } => {
+                Some(((*columns, *rows), curves.iter().map(|curve| curve.phases(levels, wavelength)).collect()))
+            }
+            _ => None,
+        }
+    }
+
+    /// As [`Curve::resolve`], for each pixel of a panel of that size.
+    pub(crate) fn resolve_pixels(
+        &self,
+        levels: usize,
+        size: (usize, usize),
+        wavelength: f64,
+        measured_at: Option<f64>,
+        sign: PhaseSign,
+    ) -> PixelCurve {
+        let mean = self.resolve(levels, wavelength, measured_at, sign);
+        let Some((regions, phases)) = self.region_phases(levels, wavelength) else {
+            return PixelCurve::uniform(mean);
+        };
+        let factor = phase_factor(wavelength, measured_at, sign);
+        let phases = phases.into_iter().map(|p| p.into_iter().map(|p| p * factor).collect()).collect();
+        PixelCurve::regional(mean, regions, phases, size)
     }
 
     /// The curve worked out level by level at a wavelength [m]; `measured_at` is where a phase curve was measured.
@@ -149,18 +211,74 @@ impl Curve {
             Self::LinearAmplitude => {
                 DriveCurve::amplitude((0..levels).map(|l| l as f64 / (levels.max(2) - 1) as f64).collect())
             }
+            Self::LevelTable { output } => {
+                let factor = phase_factor(wavelength, measured_at, sign);
+                let values = self.phases(levels, wavelength).into_iter().map(|p| p * factor).collect();
+                DriveCurve::table(values, output, factor)
+            }
             _ => {
-                let mut factor = match sign {
-                    PhaseSign::Increasing => 1.0,
-                    PhaseSign::Decreasing => -1.0,
-                };
-                if let (Some(measured), false) = (measured_at, matches!(self, Self::Piston { .. })) {
-                    factor *= measured / wavelength;
-                }
+                let measured_at = measured_at.filter(|_| !matches!(self, Self::Piston { .. }));
+                let factor = phase_factor(wavelength, measured_at, sign);
                 DriveCurve::phase(self.phases(levels, wavelength).into_iter().map(|p| p * factor).collect())
             }
         }
     }
+}
+
+/// Factor on phases measured at another wavelength or counted the other way.
+fn phase_factor(wavelength: f64, measured_at: Option<f64>, sign: PhaseSign) -> f64 {
+    let sign = match sign {
+        PhaseSign::Increasing => 1.0,
+        PhaseSign::Decreasing => -1.0,
+    };
+    sign * measured_at.map_or(1.0, |measured| measured / wavelength)
+}
+
+fn check_regions(columns: usize, rows: usize, curves: &[Curve], levels: usize, path: &Path) -> Result<()> {
+    let refuse = |what: String| Err(Error::calibration(path, what));
+    // A region of fewer pixels than a curve has parameters is no region.
+    if columns == 0 || rows == 0 || columns > 256 || rows > 256 {
+        return refuse(format!("response.regions = {columns}×{rows} must be 1 … 256 each"));
+    }
+    if curves.len() != columns * rows {
+        return refuse(format!("{} curves for {} regions; give one each", curves.len(), columns * rows));
+    }
+    let mut rises = None;
+    for (k, curve) in curves.iter().enumerate() {
+        if !matches!(curve, Curve::Table { .. } | Curve::Polynomial { .. })
+            || std::mem::discriminant(curve) != std::mem::discriminant(&curves[0])
+        {
+            return refuse(format!("region {k}: regions have level → phase tables, or polynomials, all of one kind"));
+        }
+        curve.check(levels, path)?;
+        let phases = curve.phases(levels, f64::NAN);
+        let rising = phases.last() > phases.first();
+        if *rises.get_or_insert(rising) != rising {
+            return refuse(format!("region {k}: its phase runs against the other regions'"));
+        }
+    }
+    Ok(())
+}
+
+/// Phases of all levels of a panel from a controller's table: between its outputs in proportion, beyond them as at the end.
+fn table_phases(output: &[u16], levels: usize) -> Vec<f64> {
+    let mut known: Vec<(u16, f64)> =
+        output.iter().enumerate().map(|(gray, &level)| (level, TAU * gray as f64 / output.len() as f64)).collect();
+    known.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    // Two grays of one level are shown as the lower one.
+    known.dedup_by_key(|pair| pair.0);
+    (0..levels)
+        .map(|level| {
+            let after = known.partition_point(|pair| usize::from(pair.0) < level);
+            match (after.checked_sub(1).and_then(|i| known.get(i)), known.get(after)) {
+                (Some(&(a, low)), Some(&(b, high))) => {
+                    low + (high - low) * (level as f64 - f64::from(a)) / (f64::from(b) - f64::from(a))
+                }
+                (Some(&(_, phase)), None) | (None, Some(&(_, phase))) => phase,
+                (None, None) => 0.0,
+            }
+        })
+        .collect()
 }
 
 /// The first index at which a sequence stops being strictly monotone.
@@ -212,6 +330,20 @@ impl DriveCurve {
         steps.sort_by(f64::total_cmp);
         // The widest step may be the gap that a range below one turn leaves; the next one is a step of the curve.
         let step = if steps.len() > 1 { steps[steps.len() - 2] } else { TAU };
+        Self { modulation: Modulation::Phase, values, sorted, step }
+    }
+
+    /// From the phases of all levels [rad] and a controller's table: only the table's levels are used. Its phases are counted
+    /// times `factor`.
+    fn table(values: Vec<f64>, output: &[u16], factor: f64) -> Self {
+        let phase = |gray: usize| (factor * TAU * gray as f64 / output.len() as f64).rem_euclid(TAU);
+        let mut sorted: Vec<(f64, u16)> =
+            output.iter().enumerate().map(|(gray, &level)| (phase(gray), level)).collect();
+        sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        // Of two grays with one level the one that [`table_phases`] shows remains.
+        let shown = |level: u16, phase: f64| (values[usize::from(level)] - phase + PI).rem_euclid(TAU) - PI;
+        sorted.retain(|&(phase, level)| shown(level, phase).abs() < 1e-9);
+        let step = TAU / output.len() as f64;
         Self { modulation: Modulation::Phase, values, sorted, step }
     }
 
@@ -344,6 +476,28 @@ mod tests {
         let (_, miss) = narrow.nearest(1.003 * PI);
         assert!(!narrow.unreachable(miss));
         assert!((narrow.range() - 1.6 * PI).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_controllers_table_sends_each_gray_to_its_own_level() {
+        // Ten bits out, a bent curve, two grays on one level.
+        let output: Vec<u16> = (0..256)
+            .map(|g| if g == 1 { 40 } else { (40.0 + 900.0 * (f64::from(g) / 256.0).powf(1.3)) as u16 })
+            .collect();
+        let curve = Curve::LevelTable { output: output.clone() };
+        curve.check(1024, Path::new("x.lut")).expect("fits");
+        let told = curve.check(256, Path::new("x.lut")).expect_err("too high").to_string();
+        assert!(told.contains("controller"), "{told}");
+        let curve = curve.resolve(1024, 5e-7, None, PhaseSign::Increasing);
+        for gray in [0usize, 2, 77, 128, 255] {
+            let (level, miss) = curve.nearest(TAU * gray as f64 / 256.0);
+            assert_eq!(level, output[gray]);
+            assert!(
+                miss.abs() < 1e-9 && (curve.phasor(level) - Complex64::cis(TAU * gray as f64 / 256.0)).norm() < 1e-9
+            );
+        }
+        let falling = Curve::LevelTable { output: output.clone() }.resolve(1024, 5e-7, None, PhaseSign::Decreasing);
+        assert_eq!(falling.nearest(-TAU * 77.0 / 256.0).0, output[77]);
     }
 
     #[test]

@@ -8,7 +8,8 @@
 //! the first order comes out 30 % too weak.)
 
 use super::frame::{Frame, Illumination};
-use super::response::{DriveCurve, Modulation, Response};
+use super::regional::PixelCurve;
+use super::response::{Modulation, Response};
 use super::wavefront::Wavefront;
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Complex64, Fft2, Field, Grid};
@@ -75,9 +76,10 @@ pub fn simulate(frame: &Frame, settings: &Simulation, progress: &Progress) -> Re
     let curve = match &faults.response {
         Some(response) => {
             response.curve.check(profile.levels(), &profile.source)?;
-            response.curve.resolve(profile.levels(), wavelength, response.wavelength, profile.phase_sign)
+            let size = (profile.width, profile.height);
+            response.curve.resolve_pixels(profile.levels(), size, wavelength, response.wavelength, profile.phase_sign)
         }
-        None => profile.drive_curve(wavelength)?.0,
+        None => profile.pixel_curve(wavelength)?.0,
     };
     let n = settings.subsamples;
     let dead = Complex32::new(faults.dead_space.unwrap_or(profile.dead_space) as f32, 0.0);
@@ -128,18 +130,19 @@ fn check(frame: &Frame, grid: Grid, settings: &Simulation) -> Result<()> {
 }
 
 /// Unwrapped phase [rad] or amplitude of each cell: `cells × cells` cells a pixel, blended by the crosstalk.
-fn cell_values(frame: &Frame, curve: &DriveCurve, cells: usize, faults: &Faults) -> Result<Vec<f32>> {
-    let table: Vec<f32> = curve.values().iter().map(|&v| v as f32).collect();
-    if let Some(i) = frame.levels.iter().position(|&l| usize::from(l) >= table.len()) {
-        let what = format!("level {} at pixel {i}; the panel has {}", frame.levels[i], table.len());
+fn cell_values(frame: &Frame, curve: &PixelCurve, cells: usize, faults: &Faults) -> Result<Vec<f32>> {
+    let count = curve.mean.levels();
+    if let Some(i) = frame.levels.iter().position(|&l| usize::from(l) >= count) {
+        let what = format!("level {} at pixel {i}; the panel has {count}", frame.levels[i]);
         return Err(Error::parameter("frame", what));
     }
+    let pixels = curve.values(&frame.levels, frame.width)?;
     let (width, height) = (frame.width * cells, frame.height * cells);
     let mut values = vec![0.0; width * height];
     values.par_chunks_mut(width).enumerate().for_each(|(row, values)| {
-        let levels = &frame.levels[row / cells * frame.width..][..frame.width];
+        let pixels = &pixels[row / cells * frame.width..][..frame.width];
         for (column, value) in values.iter_mut().enumerate() {
-            *value = table[usize::from(levels[column / cells])];
+            *value = pixels[column / cells];
         }
     });
     if faults.crosstalk > 0.0 {

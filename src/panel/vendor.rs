@@ -6,6 +6,23 @@ use crate::error::{Error, Result};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
+/// Largest calibration file: a 4K wavefront as text takes 40 MB.
+const LARGEST: u64 = 256 << 20;
+
+/// A file's bytes, unless it is larger than any calibration.
+fn bytes(path: &Path) -> Result<Vec<u8>> {
+    let size = std::fs::metadata(path).map_err(Error::io(path))?.len();
+    if size > LARGEST {
+        return Err(Error::calibration(path, format!("{} MB is no calibration file", size >> 20)));
+    }
+    std::fs::read(path).map_err(Error::io(path))
+}
+
+/// A calibration file as text.
+pub(super) fn text(path: &Path) -> Result<String> {
+    String::from_utf8(bytes(path)?).map_err(|_| Error::calibration(path, "is no text"))
+}
+
 /// A wavefront correction as an 8-bit gray picture, 0 … 255 for 0 … 2π (256 would be the full turn): Hamamatsu's
 /// `CAL_LSH<serial>_<nm>nm.bmp`, Meadowlark's wavefront images.
 ///
@@ -14,7 +31,7 @@ use std::path::Path;
 /// # Errors
 /// [`Error::Calibration`] when the file is no 8-bit gray picture.
 pub fn wavefront_picture(path: &Path, wavelength: Option<f64>) -> Result<Wavefront> {
-    let bytes = std::fs::read(path).map_err(Error::io(path))?;
+    let bytes = self::bytes(path)?;
     let picture = image::load_from_memory(&bytes)
         .map_err(|e| Error::calibration(path, format!("not a readable picture: {e}")))?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
@@ -71,7 +88,7 @@ fn rows(path: &Path, text: &str, columns: usize) -> Result<Vec<(usize, Vec<f64>)
 /// # Errors
 /// [`Error::Calibration`] for damaged or too few lines, a curve that turns back, an unknown unit.
 pub fn hamamatsu_lut(path: &Path, levels: usize) -> Result<Curve> {
-    let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
+    let text = self::text(path)?;
     let rows = rows(path, &text, 2)?;
     if rows.len() < 16 {
         let what = format!("{} lines of phase and level; such a table has 128: the file is cut short", rows.len());
@@ -118,7 +135,7 @@ pub struct LevelTable {
 /// [`Error::Calibration`] for damaged lines, inputs that do not count 0, 1, 2 …, outputs that are no 16-bit integers, a
 /// number of lines that is no power of two from 256 on.
 pub fn meadowlark_lut(path: &Path) -> Result<LevelTable> {
-    let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
+    let text = self::text(path)?;
     let rows = rows(path, &text, 2)?;
     let mut output = Vec::with_capacity(rows.len());
     for (index, (line, values)) in rows.iter().enumerate() {
@@ -144,7 +161,7 @@ pub fn meadowlark_lut(path: &Path) -> Result<LevelTable> {
 /// # Errors
 /// [`Error::Calibration`] with the line for a head, a row or a value that is not right.
 pub fn santec_csv(path: &Path) -> Result<(usize, usize, Vec<u16>)> {
-    let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
+    let text = self::text(path)?;
     let refuse = |line: usize, what: String| Err(Error::calibration(path, format!("line {line}: {what}")));
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let head = lines.next().map_or("", |(_, line)| line.trim().trim_start_matches('\u{feff}'));

@@ -12,7 +12,7 @@ mod picture;
 
 pub use colour::{ColorLight, ColorPicture};
 pub use flat_field::Cone;
-pub use picture::{Picture, Scale, write_rgb_png};
+pub use picture::{Picture, Scale, read_gray, write_rgb_png};
 
 use crate::error::{Error, Result};
 use crate::field::{Field, Grid};

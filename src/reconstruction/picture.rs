@@ -138,6 +138,25 @@ fn write_png(
     })
 }
 
+/// Reads a gray (or the luminance of a colour) picture of 8 or 16 bits as it is stored, 0 … 1: columns, rows, values.
+///
+/// # Errors
+/// [`Error::Input`] for a file that is no picture, or one of more than 2²⁸ pixels.
+pub fn read_gray(path: &Path) -> Result<(usize, usize, Vec<f32>)> {
+    let refused = |e: image::ImageError| Error::input(path, format!("not a readable picture: {e}"));
+    let reader =
+        image::ImageReader::open(path).map_err(Error::io(path))?.with_guessed_format().map_err(Error::io(path))?;
+    let (width, height) = reader.into_dimensions().map_err(refused)?;
+    if u64::from(width) * u64::from(height) > 1 << 28 {
+        return Err(Error::input(path, format!("{width}×{height} pixels are too many")));
+    }
+    let reader =
+        image::ImageReader::open(path).map_err(Error::io(path))?.with_guessed_format().map_err(Error::io(path))?;
+    let gray = reader.decode().map_err(refused)?.into_luma16();
+    let values = gray.into_raw().into_iter().map(|v| f32::from(v) / 65535.0).collect();
+    Ok((width as usize, height as usize, values))
+}
+
 /// For each sample, which cells of ±half it touches and with what share of its pixel.
 fn overlaps(count: usize, at: impl Fn(usize) -> f64, pitch: f64, half: f64, cells: usize) -> Vec<Vec<(usize, f64)>> {
     let cell = 2.0 * half / cells as f64;

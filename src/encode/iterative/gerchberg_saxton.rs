@@ -1,20 +1,35 @@
 //! Gerchberg & Saxton's projections (*Optik* 35, 237 (1972)) over several planes, with weights that even out what is too
-//! dark (Di Leonardo, Ianni & Ruocco, *Optics Express* 15, 1913 (2007)), and free light where nothing counts.
+//! dark (Di Leonardo, Ianni & Ruocco, *Optics Express* 15, 1913 (2007)), a second constraint on the phase (Chang et al.,
+//! *Applied Optics* 54, 6994 (2015)), and free light where nothing counts.
 
-use super::{Padding, Problem, Quantiser, Solution, Start, Target, phase_curve};
+use super::model::PanelModel;
+use super::{Judged, Padding, Problem, Solution, Start, Target, TargetPlane};
 use crate::error::{Error, Result};
-use crate::field::Complex32;
-use crate::panel::{PanelProfile, PhasePattern};
+use crate::field::{Complex32, Complex64};
+use crate::panel::{Illumination, PanelProfile};
 use crate::progress::Progress;
 use rayon::prelude::*;
+
+/// What a projection replaces where the target counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Constraint {
+    /// The amplitude; the phase is whatever the light has.
+    #[default]
+    Amplitude,
+    /// Amplitude and phase: [`TargetPlane::phase`], or the same everywhere, with the piston that fits best. Light of
+    /// smooth phase has no speckle; the panel's noise goes where nothing counts.
+    AmplitudeAndPhase,
+}
 
 /// Settings of [`gerchberg_saxton`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct GerchbergSaxton {
-    /// Number of projections.
+    /// Number of projections that are tried.
     pub iterations: usize,
     /// Exponent of the weights' update, 0 … 1: 0 is the plain algorithm, 1 corrects each sample by its whole ratio.
     pub weighting: f64,
+    /// What is replaced.
+    pub constraint: Constraint,
     /// Share of the panel's light that the picture is asked to take, all planes together, above 0 and at most 1; the rest
     /// goes where nothing counts. Without such places it has no effect.
     pub efficiency: f64,
@@ -22,6 +37,8 @@ pub struct GerchbergSaxton {
     pub start: Start,
     /// How the panel's borders are treated.
     pub padding: Padding,
+    /// The wave that falls on the panel.
+    pub illumination: Illumination,
 }
 
 impl Default for GerchbergSaxton {
@@ -29,17 +46,25 @@ impl Default for GerchbergSaxton {
         Self {
             iterations: 100,
             weighting: 0.6,
-            efficiency: 0.7,
+            constraint: Constraint::Amplitude,
+            efficiency: 0.5,
             start: Start::Random { seed: 1 },
             padding: Padding::Dark,
+            illumination: Illumination::Normal,
         }
     }
 }
 
-/// Finds phases for a panel by projections; the best of all iterations is returned.
+/// Longest change, as multiple of the projection's own: what a panel of phases gives back of a change is less than was
+/// asked, so that asking for more goes faster while the error falls.
+const LONGEST: f32 = 4.0;
+
+/// Finds phases for a panel by projections.
 ///
 /// On each plane the wanted amplitude (times the weight that it has grown) replaces the light's where it counts, its phase
-/// stays; light elsewhere stays as it is. The changes on all planes go back to the panel, whose levels take the phase.
+/// stays (unless it is constrained too); light elsewhere stays as it is. The changes on all planes go back to the panel,
+/// whose levels take the phase. A change that would raise the error is not made: it is tried again at half its size; sizes
+/// grow again while the error falls.
 ///
 /// # Errors
 /// [`Error::Parameter`] for a complex target or one that does not fit the panel, settings out of their domain, or a panel
@@ -62,67 +87,120 @@ pub fn gerchberg_saxton(
             format!("{} iterations, weighting {}: 1 or more, and 0 … 1", settings.iterations, settings.weighting);
         return Err(Error::parameter("iterations", what));
     }
-    let grid = profile.grid()?;
-    let quantiser = Quantiser::new(&phase_curve(profile, wavelength)?);
-    let problem = Problem::new(target, grid, wavelength, settings.padding)?;
-    let mut wish = settings.start.phases(grid, wavelength)?;
+    let model = PanelModel::new(profile, wavelength, settings.illumination)?;
+    let problem = Problem::new(target, model.grid, wavelength, settings.padding)?;
+    let count = model.grid.len();
+    let mut wish = settings.start.phases(model.grid, wavelength)?;
+    model.lit(&mut wish);
+    let projection = Projection {
+        problem: &problem,
+        wanted,
+        settings,
+        demand: wanted
+            .iter()
+            .any(|plane| plane.weight.iter().flatten().any(|w| *w == 0.0))
+            .then(|| (problem.norm / (settings.efficiency * count as f64)).sqrt() as f32),
+        share: {
+            // Planes that ask at the same place share its change, so that together they ask no more than one would.
+            let asking = |i: usize| wanted.iter().map(|plane| plane.weight.as_ref().map_or(1.0, |w| w[i])).sum::<f32>();
+            1.0 / (0..count).map(asking).fold(1.0, f32::max)
+        },
+    };
     // Weighted amplitudes: what each sample is asked to have.
     let mut asked: Vec<Vec<f32>> = wanted.iter().map(|plane| plane.amplitude.clone()).collect();
-    let free = wanted.iter().any(|plane| plane.weight.iter().flatten().any(|w| *w == 0.0));
-    let demand = (problem.norm / (settings.efficiency * grid.len() as f64)).sqrt() as f32;
-    // Planes that ask at the same place share its change, so that together they ask no more than one would.
-    let asking = |i: usize| wanted.iter().map(|plane| plane.weight.as_ref().map_or(1.0, |w| w[i])).sum::<f32>();
-    let share = 1.0 / (0..grid.len()).map(asking).fold(1.0, f32::max);
-    let mut history = Vec::with_capacity(settings.iterations + 1);
-    let mut best: Option<(f64, Vec<f32>)> = None;
     progress.start("Gerchberg-Saxton", settings.iterations as u64);
-    for iteration in 0..=settings.iterations {
+    let mut light = model.light(&wish);
+    let mut judged = problem.judge(&light.total);
+    let mut history = vec![judged.error];
+    let (mut rejected, mut size) = (0, 1.0f32);
+    let mut change = projection.change(&judged, &mut asked, 1.0);
+    for iteration in 0..settings.iterations {
         progress.check()?;
-        let panel: Vec<Complex32> = wish.par_iter().map(|&p| quantiser.show(p).1).collect();
-        let judged = problem.judge(&panel);
+        let step = |i: usize| light.total[i] + change[i] * size;
+        let next: Vec<f32> = (0..count).into_par_iter().map(|i| model.wish(i, step(i))).collect();
+        let next_light = model.light(&next);
+        let next_judged = problem.judge(&next_light.total);
+        if next_judged.error <= judged.error {
+            (wish, light, judged) = (next, next_light, next_judged);
+            if iteration + 1 < settings.iterations {
+                change = projection.change(&judged, &mut asked, size);
+            }
+            size = f32::min(LONGEST, 1.2 * size);
+        } else {
+            rejected += 1;
+            size *= 0.5;
+        }
         history.push(judged.error);
-        if best.as_ref().is_none_or(|(error, _)| judged.error < *error) {
-            best = Some((judged.error, wish.clone()));
-        }
-        if iteration == settings.iterations {
-            break;
-        }
-        // A fixed demand drives light into the free places until the rest is right; a demand that follows the light would
-        // settle for whatever there is.
-        let scale = if free { demand } else { judged.scale as f32 };
-        let mut spectrum = problem.planes.zero();
-        for ((k, field), asked) in judged.fields.iter().enumerate().zip(&mut asked) {
-            let plane = &wanted[k];
-            let exponent = settings.weighting as f32;
-            let change: Vec<Complex32> = field
-                .par_iter()
-                .zip(asked.par_iter_mut())
-                .enumerate()
-                .map(|(i, (u, asked))| {
-                    let weight = plane.weight.as_ref().map_or(1.0, |w| w[i]);
-                    let (modulus, wish) = (u.norm(), plane.amplitude[i]);
-                    if modulus == 0.0 {
-                        return Complex32::new(0.0, 0.0);
-                    }
-                    if exponent > 0.0 && wish > 0.0 {
-                        // A sample that fades to nothing in a vortex must not run away with its weight.
-                        *asked *= (wish / (scale * modulus)).clamp(0.1, 10.0).powf(exponent);
-                        *asked = asked.clamp(0.0, 10.0 * wish);
-                    }
-                    u * ((*asked / (scale * modulus) - 1.0) * weight * share)
-                })
-                .collect();
-            problem.planes.adjoint(k, &change, &mut spectrum);
-        }
-        // The change alone goes back: light beyond the window and in the free places stays as it is.
-        let change = problem.planes.panel(spectrum);
-        wish = panel.par_iter().zip(&change).map(|(u, c)| (u + c).im.atan2((u + c).re)).collect();
         progress.advance(1);
     }
-    let (_, wish) = best.ok_or(Error::Interrupted)?;
-    let phase: Vec<f32> = wish.iter().map(|&p| quantiser.show(p).0).collect();
-    let panel: Vec<Complex32> = phase.iter().map(|&p| Complex32::from_polar(1.0, p)).collect();
-    let judged = problem.judge(&panel);
-    let psnr = problem.psnr(&judged);
-    Ok(Solution { pattern: PhasePattern::new(grid, wavelength, phase)?, history, psnr, scale: judged.scale })
+    problem.solution(&model, wavelength, &wish, history, rejected)
+}
+
+struct Projection<'a> {
+    problem: &'a Problem<'a>,
+    wanted: &'a [TargetPlane],
+    settings: &'a GerchbergSaxton,
+    /// A fixed demand (scale of the light) drives light into the free places until the rest is right; a demand that follows
+    /// the light would settle for whatever there is. Absent where there is no free place.
+    demand: Option<f32>,
+    share: f32,
+}
+
+impl Projection<'_> {
+    /// What the panel's light should change by. `size` tempers the weights' update.
+    fn change(&self, judged: &Judged, asked: &mut [Vec<f32>], size: f32) -> Vec<Complex32> {
+        let scale = self.demand.unwrap_or(judged.scale as f32);
+        let exponent = self.settings.weighting as f32 * size.min(1.0);
+        let mut sum: Option<Vec<Complex32>> = None;
+        for ((k, field), asked) in judged.fields.iter().enumerate().zip(asked) {
+            let plane = &self.wanted[k];
+            let phased = match self.settings.constraint {
+                Constraint::Amplitude => None,
+                Constraint::AmplitudeAndPhase => Some(plane.phasors(field)),
+            };
+            let each = |(i, (u, asked)): (usize, (&Complex32, &mut f32))| {
+                let weight = plane.weight.as_ref().map_or(1.0, |w| w[i]);
+                let (modulus, wish) = (u.norm_sqr().sqrt(), plane.amplitude[i]);
+                if exponent > 0.0 && wish > 0.0 && modulus > 0.0 {
+                    // A sample that fades to nothing in a vortex must not run away with its weight.
+                    *asked *= (wish / (scale * modulus)).clamp(0.1, 10.0).powf(exponent);
+                    *asked = asked.clamp(0.0, 10.0 * wish);
+                }
+                let wished = match &phased {
+                    Some(phasors) => phasors(i) * (*asked / scale),
+                    None if modulus > 0.0 => u * (*asked / (scale * modulus)),
+                    None => return Complex32::new(0.0, 0.0),
+                };
+                (wished - u) * (weight * self.share)
+            };
+            let change: Vec<Complex32> = field.par_iter().zip(asked.par_iter_mut()).enumerate().map(each).collect();
+            // The change alone goes back: light beyond the window and in the free places stays as it is.
+            let back = self.problem.planes.adjoint(k, &change);
+            match &mut sum {
+                None => sum = Some(back),
+                Some(sum) => sum.par_iter_mut().zip(&back).for_each(|(sum, u)| *sum += u),
+            }
+        }
+        sum.unwrap_or_default()
+    }
+}
+
+impl TargetPlane {
+    /// The wanted phasor at each sample, turned by the piston that fits a field best.
+    fn phasors<'a>(&'a self, field: &[Complex32]) -> impl Fn(usize) -> Complex32 + Sync + 'a {
+        let wanted =
+            |i: usize| self.phase.as_ref().map_or(Complex32::new(1.0, 0.0), |p| Complex32::from_polar(1.0, p[i]));
+        let term = |(i, u): (usize, &Complex32)| {
+            let weight = self.weight.as_ref().map_or(1.0, |w| w[i]) * self.amplitude[i];
+            let v = u * wanted(i).conj() * weight;
+            Complex64::new(v.re.into(), v.im.into())
+        };
+        let overlap: Complex64 = field.iter().enumerate().map(term).sum();
+        let piston = if overlap.norm() > 0.0 { overlap / overlap.norm() } else { Complex64::new(1.0, 0.0) };
+        let piston = Complex32::new(piston.re as f32, piston.im as f32);
+        move |i| {
+            let phasor = self.phase.as_ref().map_or(Complex32::new(1.0, 0.0), |p| Complex32::from_polar(1.0, p[i]));
+            phasor * piston
+        }
+    }
 }

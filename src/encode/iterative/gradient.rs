@@ -6,33 +6,44 @@
 //! the wish ("straight through", Bengio et al., arXiv:1308.3432). On a panel of less than a turn a wish stops at the ends
 //! of the range: in the gap it would move without effect and jump from one end to the other.
 
-use super::{Judged, Padding, Problem, Quantiser, Range, Solution, Start, Target, phase_curve};
+use super::model::{Light, PanelModel, Range};
+use super::{Judged, Padding, Problem, Solution, Start, Target};
 use crate::error::{Error, Result};
 use crate::field::Complex32;
-use crate::panel::{PanelProfile, PhasePattern};
+use crate::panel::{Illumination, PanelProfile};
 use crate::progress::Progress;
 use rayon::prelude::*;
 
 /// Settings of [`gradient_descent`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct GradientDescent {
-    /// Number of steps.
+    /// Number of steps that are tried.
     pub iterations: usize,
-    /// Largest step of a pixel's phase [rad]; it falls to a twentieth towards the end along half a cosine.
+    /// Largest step of a pixel's phase [rad]; it falls to a twentieth towards the end along half a cosine, and to half
+    /// whenever a step would have raised the error.
     pub step: f64,
     /// Where to start.
     pub start: Start,
     /// How the panel's borders are treated (amplitude targets).
     pub padding: Padding,
+    /// The wave that falls on the panel.
+    pub illumination: Illumination,
 }
 
 impl Default for GradientDescent {
     fn default() -> Self {
-        Self { iterations: 200, step: 0.1, start: Start::Random { seed: 1 }, padding: Padding::Dark }
+        Self {
+            iterations: 200,
+            step: 0.1,
+            start: Start::Random { seed: 1 },
+            padding: Padding::Dark,
+            illumination: Illumination::Normal,
+        }
     }
 }
 
-/// Finds phases for a panel by gradient descent; the best of all steps is returned.
+/// Finds phases for a panel by gradient descent. A step that would raise the error is not taken; the next one starts from
+/// the same phases with half its length and without momentum.
 ///
 /// # Errors
 /// [`Error::Parameter`] for a target that does not fit the panel, settings out of their domain, or a panel that modulates
@@ -48,55 +59,52 @@ pub fn gradient_descent(
         let what = format!("{} iterations of {} rad; both must be positive", settings.iterations, settings.step);
         return Err(Error::parameter("iterations", what));
     }
-    let grid = profile.grid()?;
-    let curve = phase_curve(profile, wavelength)?;
-    let quantiser = Quantiser::new(&curve);
-    let range = quantiser.range(&curve);
-    let problem = Problem::new(target, grid, wavelength, settings.padding)?;
-    let mut wish = settings.start.phases(grid, wavelength)?;
-    if let Some(range) = range {
-        wish.par_iter_mut().for_each(|wish| *wish = range.nearest(*wish));
-    }
-    let mut moments = vec![[0.0f32; 2]; grid.len()];
-    let mut history = Vec::with_capacity(settings.iterations + 1);
-    let mut best: Option<(f64, Vec<f32>)> = None;
+    let model = PanelModel::new(profile, wavelength, settings.illumination)?;
+    let problem = Problem::new(target, model.grid, wavelength, settings.padding)?;
+    let mut wish = settings.start.phases(model.grid, wavelength)?;
+    model.lit(&mut wish);
     progress.start("gradient descent", settings.iterations as u64);
-    for iteration in 0..=settings.iterations {
+    let mut light = model.light(&wish);
+    let mut judged = problem.judge(&light.total);
+    let mut adam = Adam::new(wish.len());
+    adam.turn(&gradient_field(&problem, &judged), &light);
+    let mut history = vec![judged.error];
+    let (mut rejected, mut trust) = (0, 1.0);
+    for iteration in 0..settings.iterations {
         progress.check()?;
-        let panel: Vec<Complex32> = wish.par_iter().map(|&p| quantiser.show(p).1).collect();
-        let judged = problem.judge(&panel);
-        history.push(judged.error);
-        if best.as_ref().is_none_or(|(error, _)| judged.error < *error) {
-            best = Some((judged.error, wish.clone()));
-        }
-        if iteration == settings.iterations {
-            break;
-        }
-        let pulled = gradient_field(&problem, &judged);
         let share = iteration as f64 / settings.iterations as f64;
-        let step = settings.step * (0.05 + 0.95 * 0.5 * (1.0 + (std::f64::consts::PI * share).cos()));
-        adam(&mut wish, &mut moments, &pulled, &panel, iteration, step, range);
+        let step = trust * settings.step * (0.05 + 0.95 * 0.5 * (1.0 + (std::f64::consts::PI * share).cos()));
+        let next = adam.step(&wish, step as f32, model.range);
+        let next_light = model.light(&next);
+        let next_judged = problem.judge(&next_light.total);
+        if next_judged.error <= judged.error {
+            (wish, light, judged) = (next, next_light, next_judged);
+            trust = f64::min(1.0, 1.1 * trust);
+            if iteration + 1 < settings.iterations {
+                adam.turn(&gradient_field(&problem, &judged), &light);
+            }
+        } else {
+            rejected += 1;
+            trust *= 0.5;
+            adam.forget();
+        }
+        history.push(judged.error);
         progress.advance(1);
     }
-    let (_, wish) = best.ok_or(Error::Interrupted)?;
-    let phase: Vec<f32> = wish.iter().map(|&p| quantiser.show(p).0).collect();
-    let panel: Vec<Complex32> = phase.iter().map(|&p| Complex32::from_polar(1.0, p)).collect();
-    let judged = problem.judge(&panel);
-    let psnr = problem.psnr(&judged);
-    Ok(Solution { pattern: PhasePattern::new(grid, wavelength, phase)?, history, psnr, scale: judged.scale })
+    problem.solution(&model, wavelength, &wish, history, rejected)
 }
 
 /// A*·∂L/∂U* on the panel's pixels, for L = Σw(s|U| − a)²/Σwa² or Σ|sU − T|²/Σ|T|².
 pub(super) fn gradient_field(problem: &Problem<'_>, judged: &Judged) -> Vec<Complex32> {
     let (scale, factor) = (judged.scale as f32, (judged.scale / problem.norm) as f32);
-    let mut spectrum = problem.planes.zero();
+    let mut sum: Option<Vec<Complex32>> = None;
     for (k, field) in judged.fields.iter().enumerate() {
         let pull: Vec<Complex32> = match problem.target {
             Target::Amplitude(planes) => {
                 let plane = &planes[k];
                 let pull = |(i, u): (usize, &Complex32)| {
                     let weight = plane.weight.as_ref().map_or(1.0, |w| w[i]);
-                    let modulus = u.norm();
+                    let modulus = u.norm_sqr().sqrt();
                     // A dark sample has no direction to grow in: its derivative is taken as zero.
                     let ratio = if modulus > 0.0 { plane.amplitude[i] / modulus } else { scale };
                     u * (weight * factor * (scale - ratio))
@@ -107,37 +115,64 @@ pub(super) fn gradient_field(problem: &Problem<'_>, judged: &Judged) -> Vec<Comp
                 field.par_iter().zip(samples).map(|(u, t)| (u * scale - t) * factor).collect()
             }
         };
-        problem.planes.adjoint(k, &pull, &mut spectrum);
+        let back = problem.planes.adjoint(k, &pull);
+        match &mut sum {
+            None => sum = Some(back),
+            Some(sum) => sum.par_iter_mut().zip(&back).for_each(|(sum, u)| *sum += u),
+        }
     }
-    problem.planes.panel(spectrum)
+    sum.unwrap_or_default()
 }
 
-/// ∂L/∂φ of one pixel.
-pub(super) fn slope(pulled: Complex32, phasor: Complex32) -> f32 {
-    -2.0 * (pulled.conj() * phasor).im
+/// ∂L/∂φ of one pixel whose modulated light is given.
+pub(super) fn slope(pulled: Complex32, modulated: Complex32) -> f32 {
+    -2.0 * (pulled.conj() * modulated).im
 }
 
-fn adam(
-    wish: &mut [f32],
-    moments: &mut [[f32; 2]],
-    pulled: &[Complex32],
-    panel: &[Complex32],
-    iteration: usize,
-    step: f64,
-    range: Option<Range>,
-) {
+/// Adam's moments of every pixel's slope.
+struct Adam {
+    slopes: Vec<f32>,
+    moments: Vec<[f32; 2]>,
+    /// Slopes taken into the first and the second moments since they were empty.
+    counts: [i32; 2],
+}
+
+impl Adam {
     const BETA: [f32; 2] = [0.9, 0.99];
-    let count = iteration as i32 + 1;
-    let unbiased = BETA.map(|beta| 1.0 / (1.0 - beta.powi(count)));
-    // Slopes scale with 1/pixels and may underflow squared in single precision: they are taken times the pixel count.
-    let gain = wish.len() as f32;
-    let work = wish.par_iter_mut().zip(moments).zip(pulled.par_iter().zip(panel));
-    work.for_each(|((wish, moment), (pulled, phasor))| {
-        let slope = slope(*pulled, *phasor) * gain;
-        moment[0] = BETA[0] * moment[0] + (1.0 - BETA[0]) * slope;
-        moment[1] = BETA[1] * moment[1] + (1.0 - BETA[1]) * slope * slope;
-        let change = moment[0] * unbiased[0] / ((moment[1] * unbiased[1]).sqrt() + 1e-8);
-        let moved = *wish - step as f32 * change;
-        *wish = range.map_or(moved.rem_euclid(std::f32::consts::TAU), |range| moved.clamp(range.low, range.high));
-    });
+
+    fn new(pixels: usize) -> Self {
+        Self { slopes: vec![0.0; pixels], moments: vec![[0.0; 2]; pixels], counts: [0; 2] }
+    }
+
+    /// Takes in the slopes at new phases.
+    fn turn(&mut self, pulled: &[Complex32], light: &Light) {
+        // Slopes scale with 1/pixels and may underflow squared in single precision: they are taken times the pixel count.
+        let gain = self.slopes.len() as f32;
+        self.counts = self.counts.map(|count| count + 1);
+        let work = self.slopes.par_iter_mut().zip(&mut self.moments).zip(pulled.par_iter().zip(&light.modulated));
+        work.for_each(|((kept, moment), (pulled, modulated))| {
+            let slope = slope(*pulled, *modulated) * gain;
+            *kept = slope;
+            moment[0] = Self::BETA[0] * moment[0] + (1.0 - Self::BETA[0]) * slope;
+            moment[1] = Self::BETA[1] * moment[1] + (1.0 - Self::BETA[1]) * slope * slope;
+        });
+    }
+
+    /// Drops the momentum: the next step follows the slopes where they were taken last.
+    fn forget(&mut self) {
+        self.counts[0] = 1;
+        let fresh = 1.0 - Self::BETA[0];
+        self.moments.par_iter_mut().zip(&self.slopes).for_each(|(moment, slope)| moment[0] = fresh * slope);
+    }
+
+    /// Wishes after a step of that length [rad].
+    fn step(&self, wish: &[f32], step: f32, range: Option<Range>) -> Vec<f32> {
+        let unbiased = [0, 1].map(|k| 1.0 / (1.0 - Self::BETA[k].powi(self.counts[k])));
+        let work = wish.par_iter().zip(&self.moments).map(|(wish, moment)| {
+            let change = moment[0] * unbiased[0] / ((moment[1] * unbiased[1]).sqrt() + 1e-8);
+            let moved = wish - step * change;
+            range.map_or(moved, |range| moved.clamp(range.low, range.high))
+        });
+        work.collect()
+    }
 }

@@ -1,21 +1,27 @@
 //! Phase patterns found by iteration: what a panel of these very levels should show so that light has given amplitudes on
 //! given planes, or a given complex field within a band.
 //!
-//! The panel's levels stand inside the loop: every light that is judged comes from phases that the panel has, so a panel
-//! of few levels or of less than a turn is optimised for, not rounded to at the end.
+//! The panel stands inside the loop: every light that is judged comes from phases that the panel has, with its dead space
+//! and under the wave that falls on it, so a panel of few levels or of less than a turn is optimised for, not rounded to
+//! at the end.
+//!
+//! *Monotone.* A step that would raise the error is not taken: it is tried again, shorter. [`Solution::history`] holds the
+//! error of what was kept, and never rises.
 
 mod gerchberg_saxton;
 mod gradient;
+mod model;
 mod planes;
 
-pub use gerchberg_saxton::{GerchbergSaxton, gerchberg_saxton};
+pub use gerchberg_saxton::{Constraint, GerchbergSaxton, gerchberg_saxton};
 pub use gradient::{GradientDescent, gradient_descent};
 pub use planes::Padding;
 
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Grid};
-use crate::panel::{DriveCurve, Modulation, PanelProfile, PhasePattern};
+use crate::panel::PhasePattern;
 use crate::random::Random;
+use model::PanelModel;
 use planes::Planes;
 use rayon::prelude::*;
 use std::f32::consts::TAU;
@@ -44,6 +50,8 @@ pub struct TargetPlane {
     pub amplitude: Vec<f32>,
     /// How much each sample counts, 0 … 1; zero leaves the light free there. Absent: all count.
     pub weight: Option<Vec<f32>>,
+    /// Wanted phases [rad], for [`Constraint::AmplitudeAndPhase`]. Absent: the same everywhere.
+    pub phase: Option<Vec<f32>>,
 }
 
 /// The phases that an iteration starts from.
@@ -61,6 +69,13 @@ pub enum Start {
         /// Focal length [m]; positive makes the light diverge.
         focal_length: f64,
     },
+    /// Random phases that change smoothly, by seed: between speckle and none.
+    Smooth {
+        /// The seed.
+        seed: u64,
+        /// Distance over which the phase changes [pixels], 2 or more.
+        length: f64,
+    },
     /// Given phases [rad]: a warm start.
     Phase(Vec<f32>),
 }
@@ -70,13 +85,18 @@ pub enum Start {
 pub struct Solution {
     /// The best pattern, its phases those that the panel has.
     pub pattern: PhasePattern,
-    /// Normalised squared error after each iteration, Σw(s|U| − a)²/Σwa² with the best scale s (complex: Σ|sU − T|²/Σ|T|²).
+    /// Normalised squared error at the start and after each iteration, Σw(s|U| − a)²/Σwa² with the best scale s (complex:
+    /// Σ|sU − T|²/Σ|T|²); never rises.
     pub history: Vec<f64>,
+    /// Steps that would have raised the error and were not taken.
+    pub rejected: usize,
     /// Peak signal-to-noise ratio of the amplitude on each plane, over the samples that count, with each plane's greatest
     /// wanted amplitude as peak [dB]; of the complex field against its greatest modulus for a complex target.
     pub psnr: Vec<f64>,
     /// Scale s of the last line.
     pub scale: f64,
+    /// Share of the panel's light that lies where the target counts, mean of the planes (complex: within the band).
+    pub efficiency: f64,
 }
 
 impl Start {
@@ -99,69 +119,29 @@ impl Start {
                 };
                 Ok((0..grid.len()).into_par_iter().map(|i| turns(i).rem_euclid(1.0) as f32 * TAU).collect())
             }
+            Self::Smooth { seed, length } => {
+                if !(*length >= 2.0 && length.is_finite()) {
+                    return Err(Error::parameter("length", format!("{length} pixels must be 2 or more")));
+                }
+                // A lattice of random phases over three turns, joined by smooth steps.
+                let lattice = |x: usize, y: usize| 3.0 * TAU * Random::new(*seed, (y << 32 | x) as u64).uniform_f32();
+                let ease = |t: f64| (t * t * (3.0 - 2.0 * t)) as f32;
+                let of = |i: usize| {
+                    let (x, y) = ((i % grid.width) as f64 / length, (i / grid.width) as f64 / length);
+                    let (u, v) = (ease(x.fract()), ease(y.fract()));
+                    let (x, y) = (x as usize, y as usize);
+                    let upper = lattice(x, y) * (1.0 - u) + lattice(x + 1, y) * u;
+                    let lower = lattice(x, y + 1) * (1.0 - u) + lattice(x + 1, y + 1) * u;
+                    upper * (1.0 - v) + lower * v
+                };
+                Ok((0..grid.len()).into_par_iter().map(of).collect())
+            }
             Self::Phase(phase) if phase.len() == grid.len() => Ok(phase.clone()),
             Self::Phase(phase) => {
                 let what = format!("{} phases for {}×{} pixels", phase.len(), grid.width, grid.height);
                 Err(Error::parameter("start", what))
             }
         }
-    }
-}
-
-/// The panel's levels as a table over one turn: exact enough inside a loop, exact at its end.
-struct Quantiser {
-    /// Phase that the panel shows for a wish in each of the bins.
-    shown: Vec<(f32, Complex32)>,
-}
-
-impl Quantiser {
-    /// Bins a turn: a wish within half a bin of the border between two levels may get either, both equally good to 2e-4.
-    const BINS: usize = 1 << 14;
-
-    fn new(curve: &DriveCurve) -> Self {
-        let shown = (0..Self::BINS)
-            .map(|bin| {
-                let wish = (bin as f64 + 0.5) / Self::BINS as f64 * std::f64::consts::TAU;
-                let level = curve.nearest(wish).0;
-                let phasor = curve.phasor(level);
-                let phase = curve.values()[usize::from(level)].rem_euclid(std::f64::consts::TAU);
-                (phase as f32, Complex32::new(phasor.re as f32, phasor.im as f32))
-            })
-            .collect();
-        Self { shown }
-    }
-
-    /// The range of a panel whose phases leave a gap on the circle, wider than eight steps of its levels.
-    fn range(&self, curve: &DriveCurve) -> Option<Range> {
-        let span = curve.range();
-        let step = span / (curve.levels().max(2) - 1) as f64;
-        let low = curve.values().iter().fold(f64::INFINITY, |low, &v| low.min(v));
-        (std::f64::consts::TAU - span > 8.0 * step).then_some(Range { low: low as f32, high: (low + span) as f32 })
-    }
-
-    /// Phase [rad] in [0, 2π) and phasor that the panel shows for a wished phase [rad].
-    fn show(&self, wish: f32) -> (f32, Complex32) {
-        let turn = wish * (1.0 / TAU);
-        let bin = ((turn - turn.floor()) * Self::BINS as f32) as usize;
-        self.shown[bin.min(Self::BINS - 1)]
-    }
-}
-
-/// Phases between which a panel of less than a turn can move [rad].
-#[derive(Clone, Copy, Debug)]
-struct Range {
-    low: f32,
-    high: f32,
-}
-
-impl Range {
-    /// The same phase on the circle within the range, or the nearer end.
-    fn nearest(self, phase: f32) -> f32 {
-        let above = self.low + (phase - self.low).rem_euclid(TAU);
-        if above <= self.high {
-            return above;
-        }
-        if above - self.high < self.low + TAU - above { self.high } else { self.low }
     }
 }
 
@@ -178,6 +158,8 @@ struct Judged {
     /// Fields on the planes.
     fields: Vec<Vec<Complex32>>,
     scale: f64,
+    /// Σw|U|².
+    counted: f64,
     error: f64,
 }
 
@@ -192,6 +174,9 @@ impl<'a> Problem<'a> {
                     if plane.amplitude.len() != count || weights != count {
                         let (width, height) = (grid.width, grid.height);
                         return refuse(format!("plane {k} does not have the panel's {width}×{height} samples"));
+                    }
+                    if plane.phase.as_ref().is_some_and(|p| p.len() != count || p.iter().any(|v| !v.is_finite())) {
+                        return refuse(format!("plane {k} does not have a finite phase for each sample"));
                     }
                     let bad = |v: &f32| !(v.is_finite() && *v >= 0.0);
                     if plane.amplitude.iter().any(bad) || plane.weight.iter().flatten().any(bad) {
@@ -219,8 +204,7 @@ impl<'a> Problem<'a> {
 
     /// The light of a panel's field, with its best scale and error.
     fn judge(&self, panel: &[Complex32]) -> Judged {
-        let spectrum = self.planes.spectrum(panel);
-        let fields: Vec<_> = (0..self.planes.count()).map(|k| self.planes.field(k, &spectrum)).collect();
+        let fields: Vec<_> = (0..self.planes.count()).map(|k| self.planes.field(k, panel)).collect();
         // ⟨|U|, a⟩, ⟨|U|, |U|⟩ over what counts, in row order on every machine.
         let (mut cross, mut own) = (0.0, 0.0);
         for (k, field) in fields.iter().enumerate() {
@@ -238,7 +222,7 @@ impl<'a> Problem<'a> {
             }
         }
         let scale = if own > 0.0 { cross / own } else { 0.0 };
-        Judged { fields, scale, error: (1.0 - scale * cross / self.norm).max(0.0) }
+        Judged { fields, scale, counted: own, error: (1.0 - scale * cross / self.norm).max(0.0) }
     }
 
     fn products(&self, k: usize, i: usize, u: Complex32) -> (f64, f64) {
@@ -288,13 +272,23 @@ impl TargetPlane {
     }
 }
 
-/// The panel's curve for an iteration that needs phase.
-fn phase_curve(profile: &PanelProfile, wavelength: f64) -> Result<DriveCurve> {
-    if profile.modulation() != Modulation::Phase {
-        let what = format!("{} modulates amplitude; the iterations here need a phase panel", profile.name);
-        return Err(Error::parameter("panel", what));
+impl Problem<'_> {
+    /// What a kept state is, as a solution.
+    fn solution(
+        &self,
+        model: &PanelModel,
+        wavelength: f64,
+        wish: &[f32],
+        history: Vec<f64>,
+        rejected: usize,
+    ) -> Result<Solution> {
+        let judged = self.judge(&model.light(wish).total);
+        let phase = wish.par_iter().map(|&p| model.show(p).0).collect();
+        let efficiency = judged.counted / (self.planes.count() * model.grid.len()) as f64;
+        let psnr = self.psnr(&judged);
+        let pattern = PhasePattern::new(model.grid, wavelength, phase)?;
+        Ok(Solution { pattern, history, rejected, psnr, scale: judged.scale, efficiency })
     }
-    Ok(profile.drive_curve(wavelength)?.0)
 }
 
 #[cfg(test)]

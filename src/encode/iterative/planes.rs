@@ -1,7 +1,8 @@
-//! The panel's field on several depth planes at once, and the adjoint way back: what every iteration repeats.
+//! The panel's field on several depth planes, and the adjoint way back: what every iteration repeats.
 //!
-//! One transform of the panel's field serves all planes; each costs one inverse transform, and one more on the way back.
-//! With K planes an iteration takes K + 1 pairs of transforms.
+//! Each way is one filter: transform, multiply, transform back, with the columns' three steps in one pass and without
+//! the rows that are dark or not wanted. There and back for K planes is 2K filters, which cost less than 2K pairs of
+//! whole transforms.
 
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Fft2, Grid};
@@ -28,7 +29,7 @@ pub(super) struct Planes {
     width: usize,
     height: usize,
     transform: Fft2<f32>,
-    /// Transfer functions for frequencies of both signs: (width/2 + 1) × (height/2 + 1) each.
+    /// Transfer functions for frequencies of both signs, column by column: (width/2 + 1) columns of height/2 + 1.
     transfers: Vec<Vec<Complex32>>,
 }
 
@@ -57,10 +58,10 @@ impl Planes {
                 let limit = |axis: usize| half.map_or(limits[axis], |h| h[axis].min(limits[axis]));
                 let (limit_x, limit_y) = (limit(0), limit(1));
                 let mut transfer = vec![Complex32::new(0.0, 0.0); columns * rows];
-                transfer.par_chunks_mut(columns).enumerate().for_each(|(ky, row)| {
-                    let fy = ky as f64 / padded.extent_y();
-                    for (kx, h) in row.iter_mut().enumerate() {
-                        let fx = kx as f64 / padded.extent_x();
+                transfer.par_chunks_mut(rows).enumerate().for_each(|(kx, column)| {
+                    let fx = kx as f64 / padded.extent_x();
+                    for (ky, h) in column.iter_mut().enumerate() {
+                        let fy = ky as f64 / padded.extent_y();
                         let fz2 = wavelength.powi(-2) - fx * fx - fy * fy;
                         if fx <= limit_x && fy <= limit_y && fz2 > 0.0 {
                             let turns = z * fz2.sqrt();
@@ -81,68 +82,45 @@ impl Planes {
         self.transfers.len()
     }
 
-    /// Spectrum of a field on the panel.
-    pub(super) fn spectrum(&self, field: &[Complex32]) -> Vec<Complex32> {
-        let mut samples = self.padded(field);
-        self.transform.forward(&mut samples);
-        samples
+    /// The field on plane `k` of a field on the panel.
+    pub(super) fn field(&self, k: usize, panel: &[Complex32]) -> Vec<Complex32> {
+        self.through(k, panel, |u, h| *u *= h)
     }
 
-    /// The field on plane `k`, from the panel's spectrum.
-    pub(super) fn field(&self, k: usize, spectrum: &[Complex32]) -> Vec<Complex32> {
-        let mut samples = spectrum.to_vec();
-        self.transfer(k, &mut samples, |u, h| *u *= h);
-        self.transform.inverse(&mut samples);
-        self.cropped(samples)
+    /// The adjoint: what a field on plane `k` is on the panel.
+    pub(super) fn adjoint(&self, k: usize, field: &[Complex32]) -> Vec<Complex32> {
+        self.through(k, field, |u, h| *u *= h.conj())
     }
 
-    /// Adds the adjoint of plane `k` on a field there to a spectrum of the panel.
-    pub(super) fn adjoint(&self, k: usize, field: &[Complex32], spectrum: &mut [Complex32]) {
-        let mut samples = self.padded(field);
-        self.transform.forward(&mut samples);
-        self.transfer(k, &mut samples, |u, h| *u *= h.conj());
-        spectrum.par_iter_mut().zip(&samples).for_each(|(sum, u)| *sum += u);
-    }
-
-    /// The panel's field of a spectrum.
-    pub(super) fn panel(&self, mut spectrum: Vec<Complex32>) -> Vec<Complex32> {
-        self.transform.inverse(&mut spectrum);
-        self.cropped(spectrum)
-    }
-
-    /// A dark spectrum.
-    pub(super) fn zero(&self) -> Vec<Complex32> {
-        vec![Complex32::new(0.0, 0.0); self.width * self.height]
-    }
-
-    fn transfer(&self, k: usize, samples: &mut [Complex32], apply: impl Fn(&mut Complex32, Complex32) + Sync) {
-        let (width, height) = (self.width, self.height);
-        let columns = width / 2 + 1;
+    fn through(
+        &self,
+        k: usize,
+        field: &[Complex32],
+        apply: impl Fn(&mut Complex32, Complex32) + Sync,
+    ) -> Vec<Complex32> {
+        let (width, height, rows) = (self.width, self.height, self.height / 2 + 1);
         let transfer = &self.transfers[k];
-        samples.par_chunks_mut(width).enumerate().for_each(|(ky, row)| {
-            let from = &transfer[ky.min(height - ky) * columns..][..columns];
-            for (kx, u) in row.iter_mut().enumerate() {
-                apply(u, from[kx.min(width - kx)]);
-            }
-        });
-    }
-
-    fn padded(&self, field: &[Complex32]) -> Vec<Complex32> {
-        if self.width == self.grid.width {
-            return field.to_vec();
-        }
-        let mut samples = self.zero();
-        for (row, source) in samples.chunks_mut(self.width).zip(field.chunks(self.grid.width)) {
-            row[..source.len()].copy_from_slice(source);
-        }
+        let mut samples = vec![Complex32::new(0.0, 0.0); width * height];
         samples
-    }
-
-    fn cropped(&self, samples: Vec<Complex32>) -> Vec<Complex32> {
-        if self.width == self.grid.width {
+            .par_chunks_mut(width)
+            .zip(field.par_chunks(self.grid.width))
+            .for_each(|(row, source)| row[..source.len()].copy_from_slice(source));
+        self.transform.filter(&mut samples, self.grid.height, self.grid.height, |kx, column| {
+            let from = &transfer[kx.min(width - kx) * rows..][..rows];
+            let (lower, upper) = column.split_at_mut(rows);
+            lower.iter_mut().zip(from).for_each(|(u, h)| apply(u, *h));
+            // Negative frequencies: ky and height − ky have one transfer.
+            let mirrored = from[1..].iter().rev().skip(usize::from(height.is_multiple_of(2)));
+            upper.iter_mut().zip(mirrored).for_each(|(u, h)| apply(u, *h));
+        });
+        if width == self.grid.width {
             return samples;
         }
-        samples.chunks(self.width).take(self.grid.height).flat_map(|row| &row[..self.grid.width]).copied().collect()
+        let mut out = Vec::with_capacity(self.grid.len());
+        for row in samples.chunks(width).take(self.grid.height) {
+            out.extend_from_slice(&row[..self.grid.width]);
+        }
+        out
     }
 }
 
@@ -164,17 +142,14 @@ mod tests {
         let depths = [0.003, -0.002, 0.0];
         let planes = Planes::new(grid, 532e-9, &depths, None, Padding::Dark).expect("planes");
         let panel = noise(grid, 1);
-        let spectrum = planes.spectrum(&panel);
         for (k, &z) in depths.iter().enumerate() {
             let field = Field::new(grid, 532e-9, panel.clone()).expect("field");
             let expected = crate::propagation::propagate(&field, z, &Progress::new()).expect("propagate");
-            let seen = planes.field(k, &spectrum);
+            let seen = planes.field(k, &panel);
             assert!(relative_error(&seen, &expected.samples) < 1e-5, "z = {z}");
             // ⟨A u, v⟩ = ⟨u, A* v⟩.
             let other = noise(grid, 2 + k as u64);
-            let mut back = planes.zero();
-            planes.adjoint(k, &other, &mut back);
-            let back = planes.panel(back);
+            let back = planes.adjoint(k, &other);
             let product = |a: &[Complex32], b: &[Complex32]| -> Complex64 {
                 a.iter()
                     .zip(b)

@@ -6,6 +6,7 @@
 //! (Levenberg & Marquardt), starting from the phases that the maxima and minima of the sweep tell.
 
 use crate::error::{Error, Result};
+use crate::panel::vendor::text;
 use crate::panel::{Curve, Frame, PanelProfile};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
@@ -30,64 +31,216 @@ pub struct CurveFit {
     pub residual: f64,
     /// Range of the curve [rad].
     pub range: f64,
+    /// Degree of the polynomial.
+    pub degree: usize,
 }
 
-/// The grating to show: stripes of `stripe` columns at level `fixed` and at `level`.
+/// A part of a panel whose phase is measured by itself: `place` of `parts`, counted in columns and rows from the upper left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Region {
+    /// Column and row of the region.
+    pub place: (usize, usize),
+    /// Number of regions side by side and one above the other.
+    pub parts: (usize, usize),
+}
+
+/// The grating to show: stripes of `stripe` columns at level `fixed` and at `level`, over the whole panel or one region of
+/// it; the rest then stands at `fixed` and sends nothing into the grating's orders.
 ///
 /// # Errors
-/// [`Error::Parameter`] for levels that the panel does not have, or stripes without width.
-pub fn sweep_frame(profile: &PanelProfile, wavelength: f64, fixed: u16, level: u16, stripe: usize) -> Result<Frame> {
+/// [`Error::Parameter`] for levels that the panel does not have, stripes without width, a region outside the panel.
+pub fn sweep_frame(
+    profile: &PanelProfile,
+    wavelength: f64,
+    (fixed, level): (u16, u16),
+    stripe: usize,
+    region: Option<Region>,
+) -> Result<Frame> {
     if stripe == 0 {
         return Err(Error::parameter("stripe", "0 columns; take at least one, a few against crosstalk"));
     }
-    let row: Vec<u16> =
-        (0..profile.width).map(|x| if (x / stripe).is_multiple_of(2) { fixed } else { level }).collect();
-    let mut frame = Frame::new(profile, wavelength, row.repeat(profile.height))?;
+    let (width, height) = (profile.width, profile.height);
+    let Region { place, parts } = region.unwrap_or(Region { place: (0, 0), parts: (1, 1) });
+    if place.0 >= parts.0 || place.1 >= parts.1 || parts.0 > width || parts.1 > height {
+        return Err(Error::parameter("regions", format!("region {place:?} of {parts:?} on {width}×{height} pixels")));
+    }
+    let inside = |at: usize, size: usize, place: usize, parts: usize| at * parts / size == place;
+    let row = |bright: bool| -> Vec<u16> {
+        let grating = |x: usize| bright && inside(x, width, place.0, parts.0) && !(x / stripe).is_multiple_of(2);
+        (0..width).map(|x| if grating(x) { level } else { fixed }).collect()
+    };
+    let rows = [row(false), row(true)];
+    let levels = (0..height).flat_map(|y| &rows[usize::from(inside(y, height, place.1, parts.1))]).copied().collect();
+    let mut frame = Frame::new(profile, wavelength, levels)?;
     frame.metadata.origin.notes = vec![format!("calibration grating: levels {fixed} and {level}, stripes of {stripe}")];
     Ok(frame)
 }
 
-/// Reads measured powers: lines `level,power` (a head line and lines that begin with `#` are passed over).
+/// A measured power of the sweep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Power {
+    /// Level of the grating's second stripes.
+    pub level: u16,
+    /// Column and row of the region that was measured, if not all of the panel.
+    pub region: Option<(usize, usize)>,
+    /// Power in any unit.
+    pub power: f64,
+}
+
+/// Reads measured powers: comma-separated lines `level,power` or, by region, `level,column,row,power`.
+///
+/// A head line names the columns, in any order, and may name others, which are passed over; so are lines that begin with
+/// `#`.
 ///
 /// # Errors
-/// [`Error::Calibration`] with the line that is not two numbers, or whose level the panel does not have.
-pub fn read_powers(path: &Path, levels: usize) -> Result<Vec<(u16, f64)>> {
-    let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
-    let mut powers = Vec::new();
+/// [`Error::Calibration`] with the line that is not right, or whose level the panel does not have.
+pub fn read_powers(path: &Path, levels: usize) -> Result<Vec<Power>> {
+    let text = text(path)?;
+    let mut columns: Vec<String> = Vec::new();
+    let mut powers: Vec<Power> = Vec::new();
     for (number, line) in text.lines().enumerate() {
-        let line = line.trim();
+        let line = line.trim().trim_start_matches('\u{feff}');
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
+        let refuse = |what: String| Err(Error::calibration(path, format!("line {}: {what}", number + 1)));
         let words: Vec<&str> = line.split([',', ';', '\t']).map(str::trim).collect();
-        let pair = match words[..] {
-            [level, power] => level.parse::<u16>().ok().zip(power.parse::<f64>().ok().filter(|p| p.is_finite())),
-            _ => None,
-        };
-        match pair {
-            Some((level, power)) if usize::from(level) < levels => powers.push((level, power)),
-            Some((level, _)) => {
-                let what = format!("line {}: level {level}; the panel has 0 … {}", number + 1, levels - 1);
-                return Err(Error::calibration(path, what));
+        if columns.is_empty() {
+            let names: Vec<String> = words.iter().map(|word| word.to_lowercase()).collect();
+            if names.iter().any(|name| name == "level") && names.iter().any(|name| name == "power") {
+                columns = names;
+                continue;
             }
-            None if powers.is_empty() && line.starts_with(char::is_alphabetic) => {}
-            None => {
-                let what = format!("line {}: `{line}` is not a level and a power", number + 1);
-                return Err(Error::calibration(path, what));
-            }
+            columns = match words.len() {
+                4 => vec!["level".into(), "column".into(), "row".into(), "power".into()],
+                _ => vec!["level".into(), "power".into()],
+            };
         }
+        if words.len() != columns.len() {
+            return refuse(format!(
+                "`{line}` has {} entries, {} are due: {}",
+                words.len(),
+                columns.len(),
+                columns.join(",")
+            ));
+        }
+        let word = |name: &str| columns.iter().position(|column| column == name).map(|at| words[at]);
+        let whole =
+            |name: &str| word(name).filter(|w| !w.is_empty()).map(str::parse::<usize>).transpose().map_err(drop);
+        let power = word("power").unwrap_or_default();
+        let (Ok(Some(level)), Ok(column), Ok(row)) = (whole("level"), whole("column"), whole("row")) else {
+            return refuse(format!("`{line}` does not hold whole numbers for level, column and row"));
+        };
+        let Some(power) = power.parse::<f64>().ok().filter(|p| p.is_finite()) else {
+            let what = if power.is_empty() { "the power is missing".into() } else { format!("`{power}` is no power") };
+            return refuse(what);
+        };
+        if level >= levels {
+            return refuse(format!("level {level}; the panel has 0 … {}", levels - 1));
+        }
+        let region = match (column, row) {
+            (Some(column), Some(row)) => Some((column, row)),
+            (None, None) => None,
+            _ => return refuse("a region has a column and a row".into()),
+        };
+        if powers.first().is_some_and(|first| first.region.is_some() != region.is_some()) {
+            return refuse("some powers are of regions, some of the whole panel".into());
+        }
+        powers.push(Power { level: level as u16, region, power });
+    }
+    if powers.is_empty() {
+        return Err(Error::calibration(path, "holds no powers"));
     }
     Ok(powers)
 }
 
+/// Fits one curve, or where the powers are of regions one for each.
+///
+/// # Errors
+/// As [`fit_curve`]; [`Error::Calibration`] when a region has no powers.
+pub fn fit(powers: &[Power], levels: usize, order: Order, degree: Option<usize>, source: &Path) -> Result<CurveFit> {
+    let of = |region: Option<(usize, usize)>| -> Vec<(u16, f64)> {
+        powers.iter().filter(|p| p.region == region).map(|p| (p.level, p.power)).collect()
+    };
+    if powers.iter().all(|p| p.region.is_none()) {
+        return fit_curve(&of(None), levels, order, degree, source);
+    }
+    let greatest =
+        |of: fn(&(usize, usize)) -> usize| powers.iter().filter_map(|p| p.region.as_ref().map(of)).max().unwrap_or(0);
+    let (columns, rows) = (greatest(|r| r.0) + 1, greatest(|r| r.1) + 1);
+    if columns > 256 || rows > 256 {
+        return Err(Error::calibration(source, format!("{columns}×{rows} regions are too many: 256 each")));
+    }
+    let mut all = CurveFit {
+        curve: Curve::LinearAmplitude,
+        uncertainty: vec![0.0; levels],
+        residual: 0.0,
+        range: f64::INFINITY,
+        degree: 0,
+    };
+    let mut curves = Vec::new();
+    for row in 0..rows {
+        for column in 0..columns {
+            let one = of(Some((column, row)));
+            if one.is_empty() {
+                return Err(Error::calibration(source, format!("region {column},{row} has no powers")));
+            }
+            let found = fit_curve(&one, levels, order, degree, source).map_err(|e| match e {
+                Error::Calibration { path, what } => Error::calibration(path, format!("region {column},{row}: {what}")),
+                other => other,
+            })?;
+            // The worst of all regions is what a user should know.
+            all.uncertainty.iter_mut().zip(&found.uncertainty).for_each(|(worst, own)| *worst = worst.max(*own));
+            all.residual = all.residual.max(found.residual);
+            all.range = all.range.min(found.range);
+            all.degree = all.degree.max(found.degree);
+            curves.push(found.curve);
+        }
+    }
+    all.curve = Curve::Regional { columns, rows, curves };
+    all.curve.check(levels, source)?;
+    Ok(all)
+}
+
 /// Fits the curve of a panel with `levels` levels to the powers of a sweep against level 0.
 ///
-/// `degree` is that of the polynomial: 5 follows a liquid crystal.
+/// `degree` is that of the polynomial; absent, the one of 2 … 8 that explains the powers best for its number of
+/// coefficients (Schwarz's criterion n·ln(Σr²/n) + k·ln n, *Ann. Statist.* 6, 461 (1978)).
+///
+/// Powers do not tell in which direction the phase runs: the curve always rises, the panel's sign is the profile's.
 ///
 /// # Errors
 /// [`Error::Calibration`] (for `source`) when there are too few powers, the sweep shows no modulation, or the fitted
 /// curve turns back: then the sweep is too noisy or the degree too high.
-pub fn fit_curve(powers: &[(u16, f64)], levels: usize, order: Order, degree: usize, source: &Path) -> Result<CurveFit> {
+pub fn fit_curve(
+    powers: &[(u16, f64)],
+    levels: usize,
+    order: Order,
+    degree: Option<usize>,
+    source: &Path,
+) -> Result<CurveFit> {
+    let Some(degree) = degree else {
+        let count = powers.len() as f64;
+        let score =
+            |fit: &CurveFit| count * fit.residual.max(1e-12).powi(2).ln() + (fit.degree + 2) as f64 * count.ln();
+        let fits: Vec<Result<CurveFit>> =
+            (2..=8).map(|degree| fit_degree(powers, levels, order, degree, source)).collect();
+        let mut best: Option<CurveFit> = None;
+        let mut refused = None;
+        for fit in fits {
+            match fit {
+                Ok(fit) if best.as_ref().is_none_or(|best| score(&fit) < score(best)) => best = Some(fit),
+                Ok(_) => {}
+                Err(error) => refused = refused.or(Some(error)),
+            }
+        }
+        let none = || refused.unwrap_or_else(|| Error::calibration(source, "no curve fits the powers"));
+        return best.ok_or_else(none);
+    };
+    fit_degree(powers, levels, order, degree, source)
+}
+
+fn fit_degree(powers: &[(u16, f64)], levels: usize, order: Order, degree: usize, source: &Path) -> Result<CurveFit> {
     let refuse = |what: String| Err(Error::calibration(source, what));
     if !(1..=9).contains(&degree) {
         return Err(Error::parameter("degree", format!("{degree} must be 1 … 9")));
@@ -130,7 +283,7 @@ pub fn fit_curve(powers: &[(u16, f64)], levels: usize, order: Order, degree: usi
     let curve = Curve::Polynomial { coefficients };
     curve.check(levels, source)?;
     let range = phase_at(&parameters[..degree], 1.0).abs();
-    Ok(CurveFit { curve, uncertainty, residual: (squares / x.len() as f64).sqrt() / amplitude.abs(), range })
+    Ok(CurveFit { curve, uncertainty, residual: (squares / x.len() as f64).sqrt() / amplitude.abs(), range, degree })
 }
 
 /// Σ cᵢ·xⁱ from i = 1.

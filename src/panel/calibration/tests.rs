@@ -1,6 +1,6 @@
 //! Hidden curves and bends are found again on the simulated panel.
 
-use super::curve::Order;
+use super::curve::{Order, Power, Region};
 use super::*;
 use crate::field::{Complex32, Grid};
 use crate::panel::{Curve, Faults, PanelProfile, Response, Simulation, Wavefront, correct, simulate};
@@ -24,14 +24,13 @@ fn normal(random: &mut Random) -> f64 {
     (0..12).map(|_| random.uniform()).sum::<f64>() - 6.0
 }
 
-/// A curve of `range` rad, bent by five per cent of it.
-fn hidden(range: f64) -> Vec<f64> {
-    (0..256)
-        .map(|level| {
-            let x = f64::from(level) / 255.0;
-            range * (x + 0.05 * (PI * x).sin() - 0.02 * (TAU * x).sin())
-        })
-        .collect()
+/// A curve of `range` rad with a random smooth bend of five per cent of it at its greatest.
+fn hidden(range: f64, seed: u64) -> Vec<f64> {
+    let mut random = Random::new(seed, 7);
+    let waves: Vec<f64> = (1..=3).map(|k| (2.0 * random.uniform() - 1.0) / f64::from(k)).collect();
+    let bend = |x: f64| waves.iter().zip(1..).map(|(a, k)| a * (PI * f64::from(k) * x).sin()).sum::<f64>();
+    let greatest = (0..256).map(|l| bend(f64::from(l) / 255.0).abs()).fold(0.0, f64::max);
+    (0..256).map(|level| f64::from(level) / 255.0).map(|x| range * (x + 0.05 * bend(x) / greatest)).collect()
 }
 
 #[test]
@@ -40,12 +39,12 @@ fn a_bent_curve_is_found_again_from_noisy_powers() {
     for (range, order) in
         [(2.1 * PI, Order::First), (2.1 * PI, Order::Zero), (1.6 * PI, Order::First), (5.2 * PI, Order::First)]
     {
-        let truth = hidden(range);
+        let truth = hidden(range, (100.0 * range) as u64);
         let response = Some(Response { wavelength: None, curve: Curve::Table { phase: truth.clone() } });
         let mut random = Random::new(3, 0);
         let powers: Vec<(u16, f64)> = (0..256u16)
             .map(|level| {
-                let frame = sweep_frame(&profile, WAVELENGTH, 0, level, 4).expect("frame");
+                let frame = sweep_frame(&profile, WAVELENGTH, (0, level), 4, None).expect("frame");
                 let settings = Simulation {
                     faults: Faults { response: response.clone(), ..Faults::default() },
                     ..Simulation::default()
@@ -65,12 +64,13 @@ fn a_bent_curve_is_found_again_from_noisy_powers() {
                 (level, power * (1.0 + 0.01 * normal(&mut random)) + 0.2)
             })
             .collect();
-        let fit = fit_curve(&powers, 256, order, 5, Path::new("powers.csv")).expect("fit");
+        let fit = fit_curve(&powers, 256, order, None, Path::new("powers.csv")).expect("fit");
         let found = Response { wavelength: None, curve: fit.curve.clone() };
         let profile = PanelProfile { responses: vec![found], ..profile.clone() };
         let values = profile.drive_curve(WAVELENGTH).expect("curve").0;
         let squares: f64 = values.values().iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum();
         let rms = (squares / 256.0).sqrt();
+        println!("{range:.2} rad, {order:?}: {rms:.4} rad RMS, degree {}", fit.degree);
         assert!(rms < 0.05, "{range} {order:?}: {rms} rad");
         assert!(fit.uncertainty.iter().all(|u| *u < 0.1) && (fit.range / range - 1.0).abs() < 0.02);
     }
@@ -80,20 +80,36 @@ fn a_bent_curve_is_found_again_from_noisy_powers() {
 fn sweeps_that_tell_nothing_are_refused() {
     let path = Path::new("powers.csv");
     let flat: Vec<(u16, f64)> = (0..256).map(|l| (l, 1.0)).collect();
-    assert!(fit_curve(&flat, 256, Order::First, 5, path).expect_err("flat").to_string().contains("no modulation"));
-    assert!(fit_curve(&flat[..20], 256, Order::First, 5, path).expect_err("few").to_string().contains("20 powers"));
+    assert!(
+        fit_curve(&flat, 256, Order::First, Some(5), path).expect_err("flat").to_string().contains("no modulation")
+    );
+    assert!(
+        fit_curve(&flat[..20], 256, Order::First, Some(5), path).expect_err("few").to_string().contains("20 powers")
+    );
     let folder = tempfile::tempdir().expect("folder");
     let file = folder.path().join("p.csv");
     std::fs::write(&file, "level,power\n0,0.1\n# remark\n1;0.2\n255\t3e-3\n").expect("write");
-    assert_eq!(read_powers(&file, 256).expect("read"), [(0, 0.1), (1, 0.2), (255, 3e-3)]);
-    for (text, word) in
-        [("0,1\n256,1\n", "line 2: level 256"), ("0,1\nx,1\n", "line 2"), ("0,1,2\n", "line 1"), ("0,nan\n", "line 1")]
-    {
+    let whole = |level: u16, power: f64| Power { level, region: None, power };
+    assert_eq!(read_powers(&file, 256).expect("read"), [whole(0, 0.1), whole(1, 0.2), whole(255, 3e-3)]);
+    std::fs::write(&file, "power,file,row,column,level\n0.5,a.png,1,2,7\n").expect("write");
+    assert_eq!(read_powers(&file, 256).expect("read"), [Power { level: 7, region: Some((2, 1)), power: 0.5 }]);
+    for (text, word) in [
+        ("0,1\n256,1\n", "line 2: level 256"),
+        ("0,1\nx,1\n", "line 2"),
+        ("0,1,2\n", "line 1"),
+        ("0,nan\n", "line 1"),
+        ("level,power\n3,\n", "line 2: the power is missing"),
+        ("level,column,row,power\n3,0,0,1\n3,,,1\n", "line 3"),
+        ("level,column,row,power\n3,0,,1\n", "column and a row"),
+        ("# nothing\n", "no powers"),
+    ] {
         std::fs::write(&file, text).expect("write");
         let error = read_powers(&file, 256).expect_err(word).to_string();
         assert!(error.contains(word), "{error}");
     }
-    assert!(sweep_frame(&panel(8, 4), WAVELENGTH, 0, 300, 2).is_err());
+    assert!(sweep_frame(&panel(8, 4), WAVELENGTH, (0, 300), 2, None).is_err());
+    let outside = Some(Region { place: (2, 0), parts: (2, 1) });
+    assert!(sweep_frame(&panel(8, 4), WAVELENGTH, (0, 3), 2, outside).is_err());
 }
 
 #[test]

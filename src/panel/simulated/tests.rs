@@ -28,6 +28,7 @@ fn panel(width: usize, height: usize, fill_factor: f64, dead_space: f64, curve: 
         settle_time: None,
         refresh: None,
         edid: None,
+        corrections: Vec::new(),
         unverified: Vec::new(),
     }
 }
@@ -162,7 +163,7 @@ fn crosstalk_blurs_the_phase_by_an_error_function() {
     let profile = panel(64, 3, 1.0, 0.0, turn());
     let frame = levels(&profile, |column, _| if column < 32 { 0 } else { 200 });
     let faults = Faults { crosstalk: 1.5, ..Faults::default() };
-    let curve = profile.drive_curve(WAVELENGTH).expect("curve").0;
+    let curve = profile.pixel_curve(WAVELENGTH).expect("curve").0;
     for cells in [1, 4] {
         let values = cell_values(&frame, &curve, cells, &faults).expect("cells");
         for (i, value) in values[64 * cells..][..64 * cells].iter().enumerate() {

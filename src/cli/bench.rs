@@ -1,0 +1,172 @@
+//! `bench`: what there is, side by side.
+
+use super::bar::Bar;
+use super::report::{Report, seconds};
+use clap::{Args, Subcommand};
+use holodrive::comparison::{Effort, compare, encodings, flat_picture, markdown, panels, scene_picture};
+use holodrive::encode::iterative::{GradientDescent, Start, Target, TargetPlane, gradient_descent};
+use holodrive::field::{Complex32, Fft2};
+use holodrive::panel::PanelProfile;
+use holodrive::{Error, Result, files};
+use std::path::PathBuf;
+use std::time::Instant;
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum BenchCommand {
+    /// All encodings on a flat picture and on scenes, on three simulated panels: a table in Markdown.
+    #[command(
+        after_help = "Examples:\n  holodrive bench encodings --scene scenes/cornell.gltf --scene scenes/depth-chart.gltf -o table.md\n  holodrive bench encodings --size 96x72 --iterations 20 --only double-phase --only weighted --json"
+    )]
+    Encodings(EncodingsArgs),
+    /// Iterations per second of the gradient descent beside the time of a pair of Fourier transforms.
+    #[command(after_help = "Example:\n  holodrive bench iterations --size 1920x1080 --planes 3")]
+    Iterations(IterationsArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EncodingsArgs {
+    /// Pixels of the panel (of 8 µm).
+    #[arg(long, default_value = "384x288", value_parser = super::args::size, value_name = "WxH")]
+    size: (usize, usize),
+    /// Iterations of the methods that iterate.
+    #[arg(long, default_value_t = 300, value_name = "N")]
+    iterations: usize,
+    /// A scene (.gltf, .glb) beside the flat picture; may be given again.
+    #[arg(long, value_name = "FILE")]
+    scene: Vec<PathBuf>,
+    /// Only this encoding; may be given again.
+    #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(holodrive::encode::Encoding::NAMES), value_name = "NAME")]
+    only: Vec<String>,
+    /// Also write the table to this file.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct IterationsArgs {
+    /// Pixels of the panel.
+    #[arg(long, default_value = "1920x1080", value_parser = super::args::size, value_name = "WxH")]
+    size: (usize, usize),
+    /// Number of depth planes.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    planes: usize,
+    /// Iterations that are timed.
+    #[arg(long, default_value_t = 8, value_name = "N")]
+    iterations: usize,
+}
+
+pub(super) fn bench(command: &BenchCommand) -> Result<Report> {
+    match command {
+        BenchCommand::Encodings(args) => table(args),
+        BenchCommand::Iterations(args) => iterations(args),
+    }
+}
+
+fn table(args: &EncodingsArgs) -> Result<Report> {
+    let mut report = Report::new("bench encodings");
+    let (width, height) = args.size;
+    if width < 32 || height < 32 || width * height > 1 << 24 {
+        return Err(Error::parameter("size", format!("{width}×{height}: sides of 32 or more, 2²⁴ pixels at most")));
+    }
+    if args.iterations == 0 {
+        return Err(Error::parameter("iterations", "0; take one or more"));
+    }
+    let bar = Bar::new();
+    let panels = panels(width, height)?;
+    let mut pictures = vec![("flat".to_owned(), flat_picture(&panels[0].profile))];
+    for scene in &args.scene {
+        let name = scene.file_stem().map_or_else(|| scene.display().to_string(), |s| s.to_string_lossy().into_owned());
+        // As many planes as the depth chart has letters; three show that depth is there.
+        let planes = if name.contains("chart") { 4 } else { 3 };
+        pictures.push((name, scene_picture(scene, &panels[0].profile, planes, &bar.progress)?));
+    }
+    let mut rows = Vec::new();
+    for (name, picture) in &pictures {
+        for panel in &panels {
+            for encoding in encodings() {
+                if !args.only.is_empty() && !args.only.iter().any(|only| only == encoding) {
+                    continue;
+                }
+                bar.progress.check()?;
+                let effort = Effort { iterations: args.iterations };
+                rows.push(compare((name, picture), panel, encoding, effort, &bar.progress)?);
+            }
+        }
+    }
+    let table = markdown(&rows);
+    if let Some(path) = &args.output {
+        files::write_bytes(path, table.as_bytes())?;
+        report.add("output", path.display().to_string(), "");
+    }
+    report.add("simulated", true, "");
+    report.add("size", vec![width, height], "");
+    report.add("iterations", args.iterations, "");
+    report.add_serialised("rows", &rows, table.trim_end());
+    Ok(report)
+}
+
+fn iterations(args: &IterationsArgs) -> Result<Report> {
+    let mut report = Report::new("bench iterations");
+    let (width, height) = args.size;
+    if !(1..=16).contains(&args.planes) || !(2..=10_000).contains(&args.iterations) {
+        return Err(Error::parameter("planes, iterations", "1 … 16 planes, 2 … 10000 iterations"));
+    }
+    if width < 16 || height < 16 || width * height > 1 << 26 {
+        return Err(Error::parameter("size", format!("{width}×{height}: sides of 16 or more, 2²⁶ pixels at most")));
+    }
+    let bar = Bar::new();
+    let mut profile = PanelProfile::generic()?;
+    (profile.width, profile.height, profile.signal.width, profile.signal.height) = (width, height, width, height);
+    let grid = profile.grid()?;
+    // The transforms that an iteration uses: twice the panel's sides.
+    let transform = Fft2::<f32>::new(2 * width, 2 * height);
+    let mut samples: Vec<Complex32> = (0..4 * grid.len()).map(|i| Complex32::new((i % 7) as f32, 0.0)).collect();
+    let pair = (0..3)
+        .map(|_| {
+            let begin = Instant::now();
+            transform.forward(&mut samples);
+            transform.inverse(&mut samples);
+            begin.elapsed().as_secs_f64()
+        })
+        .fold(f64::INFINITY, f64::min);
+    drop(samples);
+    let plane = |k: usize| {
+        let value = |i: usize| 0.5 + 0.4 * (0.05 * ((i % width) + 3 * k) as f32).sin();
+        TargetPlane {
+            z: -0.1 - 0.02 * k as f64,
+            amplitude: (0..grid.len()).map(value).collect(),
+            weight: None,
+            phase: None,
+        }
+    };
+    let target = Target::Amplitude((0..args.planes).map(plane).collect());
+    let run = |count: usize| -> Result<f64> {
+        let settings =
+            GradientDescent { iterations: count, start: Start::Random { seed: 1 }, ..GradientDescent::default() };
+        let begin = Instant::now();
+        gradient_descent(&target, &profile, profile.default_wavelength(), &settings, &bar.progress)?;
+        Ok(begin.elapsed().as_secs_f64())
+    };
+    // Planning, the first and the last look are the same in both.
+    let (one, many) = (run(1)?, run(1 + args.iterations)?);
+    let iteration = (many - one) / args.iterations as f64;
+    let share = iteration / pair / args.planes as f64;
+    report.add("size", vec![width, height], "");
+    report.add("planes", args.planes, "");
+    report.add("pair_seconds", pair, "");
+    report.add("iteration_seconds", iteration, "");
+    report.add("iterations_per_second", 1.0 / iteration, "");
+    report.add(
+        "pairs_per_plane",
+        share,
+        format!(
+            "{width} × {height}, {} planes: {:.2} iterations a second, {} each; a pair of transforms of twice the sides takes {}: \
+             {share:.2} pairs a plane",
+            args.planes,
+            1.0 / iteration,
+            seconds(iteration),
+            seconds(pair)
+        ),
+    );
+    Ok(report)
+}

@@ -1,0 +1,317 @@
+//! All encodings side by side: the same pictures, on the same panels, seen by the same simulated eye.
+//!
+//! # What is asked
+//!
+//! A picture stands in a window in the middle of the panel's rectangle, its pixels on one or more planes behind the panel
+//! ([`DepthPicture`]). Encodings of a *field* get the field of all planes' amplitudes with one phase everywhere (no speckle
+//! of its own); encodings by *amplitudes on planes* get the amplitudes, and choose the phases. Light beside the window, and
+//! in it at the depths of other pixels, counts for neither.
+//!
+//! # What is measured
+//!
+//! The frame lights the simulated panel; the field behind it passes the encoding's own stop and is carried to each plane.
+//! Amplitudes are scaled by one factor for all planes, the least-squares one (Σwa|U|/Σw|U|²), and compared where the
+//! picture stands at that depth:
+//!
+//! - *PSNR* of the amplitudes against the greatest wanted one, over all planes and for the worst plane;
+//! - *SSIM* of the picture put together from its planes;
+//! - *efficiency*: share of the light on the panel that arrives where the picture stands;
+//! - *speckle contrast*: σ/μ of seen over wanted intensity where the wanted amplitude is above a third of the greatest;
+//! - *time* of the encoding.
+//!
+//! Every figure is simulated.
+
+mod pictures;
+
+pub use pictures::{flat_picture, scene_picture};
+
+use crate::encode::iterative::TargetPlane;
+use crate::encode::pictures::{DepthPicture, encode_planes};
+use crate::encode::{
+    DoublePhase, EncodeSettings, Encoding, ErrorDiffusion, PlaneEncoding, PlaneMethod, PlaneStart, blaze_and_lens,
+    encode,
+};
+use crate::error::Result;
+use crate::field::{Complex32, Field, Grid};
+use crate::panel::{Curve, Faults, Frame, Illumination, Modulation, PanelProfile, Response, Simulation, simulate};
+use crate::progress::Progress;
+use crate::propagation::{Propagator, Settings};
+use crate::reconstruction::metrics;
+use serde::Serialize;
+use std::time::Instant;
+
+/// Share of the panel's sides that pictures may take.
+pub const WINDOW: f64 = 0.75;
+
+/// How much work is put into it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Effort {
+    /// Iterations of the methods that iterate.
+    pub iterations: usize,
+}
+
+/// A panel to compare on.
+#[derive(Clone, Debug)]
+pub struct ComparedPanel {
+    /// What the table calls it.
+    pub name: &'static str,
+    /// The panel.
+    pub profile: PanelProfile,
+    /// What it does beside its profile.
+    pub faults: Faults,
+}
+
+/// A line of the table; all figures are simulated.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// The picture.
+    pub picture: String,
+    /// The panel.
+    pub panel: &'static str,
+    /// The encoding.
+    pub encoding: &'static str,
+    /// PSNR of the amplitude over all planes [dB].
+    pub psnr: f64,
+    /// PSNR on each plane [dB].
+    pub psnr_planes: Vec<f64>,
+    /// Structural similarity of the picture put together from its planes.
+    pub ssim: f64,
+    /// Share of the panel's light where the picture stands.
+    pub efficiency: f64,
+    /// Contrast of seen over wanted intensity.
+    pub speckle: f64,
+    /// Time that the encoding took [s].
+    pub seconds: f64,
+}
+
+/// The three panels of the table, `width × height` pixels of 8 µm at 632.8 nm.
+///
+/// *Ideal*: 16 bits over a turn, all of each pixel active. *8 bit*: 256 levels over a turn, 93 % active, dead space that
+/// reflects fully. *1.6π*: the same with 256 levels over 1.6π, and phases of neighbouring pixels blended by a Gaussian of
+/// 0.3 pixels.
+///
+/// # Errors
+/// [`crate::Error::Parameter`] for a size that no panel has.
+pub fn panels(width: usize, height: usize) -> Result<Vec<ComparedPanel>> {
+    let panel = |name, bits: u8, fill_factor, levels_for_2pi: f64, crosstalk| -> Result<ComparedPanel> {
+        let mut profile = PanelProfile::generic()?;
+        profile.name = format!("{name} panel of the comparison");
+        (profile.width, profile.height, profile.bits, profile.fill_factor) = (width, height, bits, fill_factor);
+        profile.signal.width = width;
+        profile.signal.height = height;
+        profile.responses = vec![Response { wavelength: None, curve: Curve::Linear { levels_for_2pi } }];
+        profile.grid()?;
+        Ok(ComparedPanel { name, profile, faults: Faults { crosstalk, ..Faults::default() } })
+    };
+    Ok(vec![
+        panel("ideal", 16, 1.0, 65536.0, 0.0)?,
+        panel("8 bit", 8, 0.93, 256.0, 0.0)?,
+        panel("1.6π, crosstalk", 8, 0.93, 255.0 / 0.8, 0.3)?,
+    ])
+}
+
+/// Share of the panel's band that encodings of a field get here: with a blaze of half the limit along both axes the zero
+/// order lies beyond its corner.
+const BAND: f64 = 0.45;
+
+/// All encodings of the table, by name.
+pub fn encodings() -> Vec<&'static str> {
+    Encoding::NAMES.to_vec()
+}
+
+/// Encodes a picture and measures what comes of it.
+///
+/// # Errors
+/// Those of the encoding and of the simulation; [`crate::Error::Interrupted`] when asked to stop.
+pub fn compare(
+    (title, picture): (&str, &DepthPicture),
+    panel: &ComparedPanel,
+    name: &'static str,
+    effort: Effort,
+    progress: &Progress,
+) -> Result<Row> {
+    let grid = panel.profile.grid()?;
+    let wavelength = panel.profile.default_wavelength();
+    let planes = picture.planes(&grid, WINDOW)?;
+    let encoding = Encoding::named(name)?;
+    let field = match encoding {
+        Encoding::Planes(_) => None,
+        _ => Some(field_of(&planes, grid, wavelength, progress)?),
+    };
+    let begin = Instant::now();
+    let frame = match (encoding, field) {
+        (Encoding::Planes(settings), _) => {
+            by_planes(planes.clone(), &panel.profile, wavelength, settings, effort, progress)?
+        }
+        (encoding, Some(field)) => by_field(&field, &panel.profile, encoding, effort, progress)?,
+        // A field is made for every other encoding, above.
+        (_, None) => return Err(crate::Error::parameter("encoding", "needs a field")),
+    };
+    let seconds = begin.elapsed().as_secs_f64();
+    let seen = measure(&frame, &planes, &panel.faults, progress)?;
+    let ssim = {
+        let (columns, rows) = picture.window(&grid, WINDOW);
+        let cut = |of: &dyn Fn(&TargetPlane, usize, usize) -> f32| -> Vec<f32> {
+            let inside = rows.clone().flat_map(|row| columns.clone().map(move |column| row * grid.width + column));
+            let at = |i: usize| {
+                let counted = planes.iter().enumerate().find(|(_, p)| p.weight.as_ref().is_none_or(|w| w[i] > 0.0));
+                counted.map_or(0.0, |(k, plane)| (of(plane, k, i) / seen.peak).clamp(0.0, 1.0))
+            };
+            inside.map(at).collect()
+        };
+        let wanted = cut(&|plane, _, i| plane.amplitude[i]);
+        let shown = cut(&|_, k, i| seen.amplitudes[k][i]);
+        metrics::ssim(&shown, &wanted, columns.len(), rows.len())
+    };
+    Ok(Row {
+        picture: title.into(),
+        panel: panel.name,
+        encoding: name,
+        psnr: seen.psnr,
+        psnr_planes: seen.psnr_planes,
+        ssim,
+        efficiency: seen.efficiency,
+        speckle: seen.speckle,
+        seconds,
+    })
+}
+
+/// The field on the panel of amplitudes on planes, one phase everywhere on each.
+fn field_of(planes: &[TargetPlane], grid: Grid, wavelength: f64, progress: &Progress) -> Result<Field> {
+    let propagator = Propagator::new(grid, grid, Settings::default())?;
+    let mut sum = Field::zeros(grid, wavelength);
+    for plane in planes {
+        let samples = plane.amplitude.iter().map(|&a| Complex32::new(a, 0.0)).collect();
+        let light = propagator.propagate(&Field::new(grid, wavelength, samples)?, -plane.z, progress)?;
+        sum.samples.iter_mut().zip(&light.samples).for_each(|(sum, u)| *sum += u);
+    }
+    Ok(sum)
+}
+
+fn by_planes(
+    planes: Vec<TargetPlane>,
+    profile: &PanelProfile,
+    wavelength: f64,
+    settings: PlaneEncoding,
+    effort: Effort,
+    progress: &Progress,
+) -> Result<Frame> {
+    let start = match settings.method {
+        PlaneMethod::DoubleConstraint => PlaneStart::Quadratic,
+        _ => PlaneStart::Random { seed: 1 },
+    };
+    let settings = PlaneEncoding { iterations: effort.iterations, start, ..settings };
+    let (made, _) = encode_planes(planes, wavelength, profile, &settings, (None, Illumination::Normal), progress)?;
+    Ok(made.frame)
+}
+
+fn by_field(
+    field: &Field,
+    profile: &PanelProfile,
+    mut encoding: Encoding,
+    effort: Effort,
+    progress: &Progress,
+) -> Result<Frame> {
+    let band = [BAND; 2];
+    match &mut encoding {
+        Encoding::DoublePhase(settings) => *settings = DoublePhase { band, ..settings.clone() },
+        Encoding::ErrorDiffusion(settings) => *settings = ErrorDiffusion { band, ..settings.clone() },
+        Encoding::Gradient(settings) => (settings.band, settings.iterations) = (band, effort.iterations),
+        _ => {}
+    }
+    let phase = encoding.modulation() == Modulation::Phase;
+    let mut settings = EncodeSettings::new(encoding);
+    if phase {
+        let angle = |limit: f64| (0.5 * limit * field.wavelength).asin();
+        let angles = [angle(field.grid.limit_x()), angle(field.grid.limit_y())];
+        settings.illumination = blaze_and_lens(angles, None, field.wavelength)?;
+    }
+    Ok(encode(field, profile, &settings, progress)?.frame)
+}
+
+/// What is seen of a frame.
+struct Seen {
+    /// Scaled amplitudes on each plane.
+    amplitudes: Vec<Vec<f32>>,
+    /// Greatest wanted amplitude.
+    peak: f32,
+    psnr: f64,
+    psnr_planes: Vec<f64>,
+    efficiency: f64,
+    speckle: f64,
+}
+
+fn measure(frame: &Frame, planes: &[TargetPlane], faults: &Faults, progress: &Progress) -> Result<Seen> {
+    let behind = simulate(frame, &Simulation { faults: faults.clone(), ..Simulation::default() }, progress)?;
+    let aperture = frame.metadata.encoding.as_ref().and_then(|encoding| encoding.aperture);
+    let propagator = Propagator::new(behind.grid, behind.grid, Settings::default())?;
+    let mut amplitudes = Vec::new();
+    for plane in planes {
+        let light = propagator.propagate_through(&behind, plane.z, aperture.as_ref(), progress)?;
+        amplitudes.push(light.samples.iter().map(|u| u.norm()).collect::<Vec<f32>>());
+    }
+    let counted = |k: usize, i: usize| planes[k].weight.as_ref().map_or(1.0, |w| f64::from(w[i]));
+    let pairs = || {
+        (0..planes.len())
+            .flat_map(|k| (0..behind.samples.len()).map(move |i| (k, i)))
+            .filter(|&(k, i)| counted(k, i) > 0.0)
+    };
+    let (mut cross, mut own) = (0.0, 0.0);
+    for (k, i) in pairs() {
+        let seen = f64::from(amplitudes[k][i]);
+        cross += seen * f64::from(planes[k].amplitude[i]);
+        own += seen * seen;
+    }
+    let scale = if own > 0.0 { cross / own } else { 0.0 };
+    for seen in &mut amplitudes {
+        seen.iter_mut().for_each(|a| *a *= scale as f32);
+    }
+    let peak = planes.iter().flat_map(|p| &p.amplitude).fold(0.0f32, |a, &b| a.max(b));
+    let mut squares = vec![(0.0, 0usize); planes.len()];
+    let mut ratios = Vec::new();
+    for (k, i) in pairs() {
+        let (seen, wanted) = (amplitudes[k][i], planes[k].amplitude[i]);
+        squares[k].0 += f64::from(seen - wanted).powi(2);
+        squares[k].1 += 1;
+        if wanted > peak / 3.0 {
+            ratios.push((seen / wanted).powi(2));
+        }
+    }
+    let decibel = |(sum, count): (f64, usize)| -10.0 * (sum / count.max(1) as f64 / f64::from(peak).powi(2)).log10();
+    let all = squares.iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    Ok(Seen {
+        psnr: decibel(all),
+        psnr_planes: squares.into_iter().map(decibel).collect(),
+        efficiency: own / behind.samples.len() as f64,
+        speckle: metrics::speckle_contrast(&ratios),
+        amplitudes,
+        peak,
+    })
+}
+
+/// Rows as a table in Markdown.
+pub fn markdown(rows: &[Row]) -> String {
+    let mut out = String::from(
+        "| picture | panel | encoding | PSNR dB | worst plane dB | SSIM | efficiency % | speckle | seconds |\n\
+         |---|---|---|---:|---:|---:|---:|---:|---:|\n",
+    );
+    for row in rows {
+        let worst = row.psnr_planes.iter().copied().fold(f64::INFINITY, f64::min);
+        out += &format!(
+            "| {} | {} | {} | {:.1} | {:.1} | {:.3} | {:.2} | {:.3} | {:.2} |\n",
+            row.picture,
+            row.panel,
+            row.encoding,
+            row.psnr,
+            worst,
+            row.ssim,
+            100.0 * row.efficiency,
+            row.speckle,
+            row.seconds
+        );
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,351 @@
+//! `calibrate` closes its loop on the simulated panel: what was hidden in it is found by the command line.
+
+use holodrive::encode::{EncodeSettings, Encoding, encode};
+use holodrive::field::{Complex32, Complex64, Field, npy};
+use holodrive::panel::calibration::zernike;
+use holodrive::panel::{Curve, Faults, Frame, PanelProfile, Response, Simulation, Wavefront, simulate, wavefront};
+use holodrive::progress::Progress;
+use holodrive::random::Random;
+use std::f64::consts::{PI, TAU};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const WAVELENGTH: f64 = 532e-9;
+
+fn holodrive(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_holodrive")).args(arguments).current_dir(folder).output().expect("runs")
+}
+
+fn done(folder: &Path, arguments: &[&str]) -> serde_json::Value {
+    let out = holodrive(folder, &[arguments, &["--json"]].concat());
+    assert!(out.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&out.stderr));
+    serde_json::from_slice(&out.stdout).expect("JSON")
+}
+
+/// Exit code 2, one line with `word`, and nothing new in the folder.
+fn refused(folder: &Path, arguments: &[&str], word: &str) {
+    let names = || {
+        let mut all: Vec<_> = fs::read_dir(folder).expect("folder").map(|e| e.expect("entry").file_name()).collect();
+        all.sort();
+        all
+    };
+    let before = names();
+    let out = holodrive(folder, arguments);
+    let said = String::from_utf8_lossy(&out.stderr);
+    let lines: Vec<&str> = said.lines().filter(|line| !line.starts_with("warning:")).collect();
+    assert_eq!(out.status.code(), Some(2), "{arguments:?}: {said}");
+    assert!(lines.len() == 1 && lines[0].contains(word), "{arguments:?} should say `{word}`: {said}");
+    assert_eq!(names(), before, "{arguments:?} left something");
+}
+
+const PROFILE: &str = "name = \"mine\"\nmaker = \"t\"\nkind = \"phase-lcos\"\nwidth = 96\nheight = 64\npitch = \"8um\"\n\
+                       bits = 8\nfill_factor = 0.93\nwavelengths = [\"532nm\"]\nunverified = [\"response\"]\n\
+                       [[response]]\nkind = \"linear\"\nlevels_for_2pi = 256\n";
+
+/// Normal noise by twelve uniform numbers.
+fn normal(random: &mut Random) -> f64 {
+    (0..12).map(|_| random.uniform()).sum::<f64>() - 6.0
+}
+
+/// A curve with a random smooth bend of five per cent of its range at its greatest.
+fn hidden(range: f64, seed: u64) -> Vec<f64> {
+    let mut random = Random::new(seed, 3);
+    let waves: Vec<f64> = (1..=3).map(|k| (2.0 * random.uniform() - 1.0) / f64::from(k)).collect();
+    let bend = |x: f64| waves.iter().zip(1..).map(|(a, k)| a * (PI * f64::from(k) * x).sin()).sum::<f64>();
+    let greatest = (0..256).map(|l| bend(f64::from(l) / 255.0).abs()).fold(0.0, f64::max);
+    (0..256).map(|level| f64::from(level) / 255.0).map(|x| range * (x + 0.05 * bend(x) / greatest)).collect()
+}
+
+/// Fills the manifest with the powers that a detector in the gratings' first order reads, one per cent of noise on each.
+fn measure(folder: &Path, truth: &Curve, stripe: usize, seed: u64) {
+    let manifest = folder.join("manifest.csv");
+    let text = fs::read_to_string(&manifest).expect("manifest");
+    let mut lines = text.lines();
+    let mut filled = format!("{}\n", lines.next().expect("head"));
+    let mut random = Random::new(seed, 0);
+    for line in lines {
+        let name = line.split(',').next().expect("name");
+        let (frame, _) = Frame::read(&folder.join(name), None, None).expect("frame");
+        let response = Some(Response { wavelength: None, curve: truth.clone() });
+        let faults = Faults { response, ..Faults::default() };
+        let seen = simulate(&frame, &Simulation { faults, ..Simulation::default() }, &Progress::new()).expect("light");
+        let width = seen.grid.width;
+        let sum: Complex64 = seen
+            .samples
+            .iter()
+            .enumerate()
+            .map(|(i, u)| {
+                let turn = Complex64::cis(-TAU * (i % width) as f64 / (2 * stripe) as f64);
+                Complex64::new(u.re.into(), u.im.into()) * turn
+            })
+            .sum();
+        let power = 3.0 * sum.norm_sqr() / (seen.grid.len() as f64).powi(2);
+        filled += &format!("{line}{:.9}\n", power * (1.0 + 0.01 * normal(&mut random)) + 0.001);
+    }
+    fs::write(&manifest, filled).expect("write");
+}
+
+/// Share of the light that a kinoform of a plane wave sends into it on a panel whose true curve is `truth`.
+fn efficiency(profile: &PanelProfile, truth: Option<Curve>) -> f64 {
+    let grid = profile.grid().expect("grid");
+    let phase = |i: usize| (TAU * (5 * (i % grid.width)) as f64 / grid.width as f64 + 0.3) as f32;
+    let samples = (0..grid.len()).map(|i| Complex32::from_polar(1.0, phase(i))).collect();
+    let field = Field::new(grid, WAVELENGTH, samples).expect("field");
+    let settings = EncodeSettings::new(Encoding::named("kinoform").expect("name"));
+    let frame = encode(&field, profile, &settings, &Progress::new()).expect("encode").frame;
+    let response = truth.map(|curve| Response { wavelength: None, curve });
+    let faults = Faults { response, ..Faults::default() };
+    let seen = simulate(&frame, &Simulation { faults, ..Simulation::default() }, &Progress::new()).expect("light");
+    let overlap: Complex64 = seen
+        .samples
+        .iter()
+        .zip(&field.samples)
+        .map(|(a, b)| {
+            let term = a * b.conj();
+            Complex64::new(term.re.into(), term.im.into())
+        })
+        .sum();
+    overlap.norm_sqr() / (grid.len() as f64).powi(2)
+}
+
+#[test]
+fn a_hidden_curve_is_found_by_sweep_powers_and_fit() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    fs::write(f.join("panel.toml"), PROFILE).expect("profile");
+    let ideal = efficiency(&PanelProfile::find(f.join("panel.toml").to_str().expect("path")).expect("profile"), None);
+    for seed in [1, 2, 3] {
+        let truth = hidden(2.15 * PI, seed);
+        let sweep = ["calibrate", "curve", "--panel", "panel.toml", "--levels", "128", "--stripe", "4", "-o", "sweep"];
+        assert_eq!(done(f, &sweep)["frames"], 128);
+        measure(&f.join("sweep"), &Curve::Table { phase: truth.clone() }, 4, seed);
+        let solve =
+            ["calibrate", "curve", "--panel", "panel.toml", "--powers", "sweep/manifest.csv", "-o", "mine.toml"];
+        let report = done(f, &solve);
+        let mine = PanelProfile::read(&f.join("mine.toml")).expect("written profile");
+        assert!(mine.unverified.is_empty() && mine.responses.len() == 1);
+        let found = mine.drive_curve(WAVELENGTH).expect("curve").0;
+        let squares: Vec<f64> = found.values().iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).collect();
+        let rms = (squares.iter().sum::<f64>() / 256.0).sqrt();
+        let told = report["uncertainty_rms"].as_f64().expect("uncertainty");
+        println!("seed {seed}: {rms:.4} rad RMS, uncertainty told {told:.4}");
+        assert!(rms < 0.05, "{rms} rad");
+        // The uncertainty that is told is the error that is made, within a factor of four.
+        assert!(rms < 4.0 * told && told < 4.0 * rms.max(1e-3), "{rms} {told}");
+        let truth = Curve::Table { phase: truth };
+        let (before, after) = (
+            efficiency(&PanelProfile::read(&f.join("panel.toml")).expect("profile"), Some(truth.clone())),
+            efficiency(&mine, Some(truth)),
+        );
+        println!("efficiency: ideal {ideal:.4}, before {before:.4}, after {after:.4}");
+        assert!((after / ideal - 1.0).abs() < 0.01, "{after} of {ideal}");
+        assert!(before < after, "{before} {after}: there was nothing to calibrate");
+    }
+}
+
+#[test]
+fn curves_that_differ_over_the_panel_are_found_by_region() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    fs::write(f.join("panel.toml"), PROFILE).expect("profile");
+    // Ranges from 1.9π to 2.4π over three by two regions.
+    let curves: Vec<Curve> =
+        (0..6).map(|k| Curve::Table { phase: hidden((1.9 + 0.1 * f64::from(k)) * PI, 40 + k as u64) }).collect();
+    let truth = Curve::Regional { columns: 3, rows: 2, curves: curves.clone() };
+    done(
+        f,
+        &[
+            "calibrate",
+            "curve",
+            "--panel",
+            "panel.toml",
+            "--levels",
+            "64",
+            "--stripe",
+            "4",
+            "--regions",
+            "3x2",
+            "-o",
+            "sweep",
+        ],
+    );
+    measure(&f.join("sweep"), &truth, 4, 5);
+    let solve = ["calibrate", "curve", "--panel", "panel.toml", "--powers", "sweep/manifest.csv", "-o", "mine.toml"];
+    let report = done(f, &solve);
+    assert_eq!(report["regions"], serde_json::json!([3, 2]));
+    let mine = PanelProfile::read(&f.join("mine.toml")).expect("written profile");
+    let ideal = efficiency(&PanelProfile::read(&f.join("panel.toml")).expect("profile"), None);
+    // One curve for all: the same powers without their regions.
+    let text = fs::read_to_string(f.join("sweep/manifest.csv")).expect("manifest");
+    let pooled: String = text
+        .lines()
+        .skip(1)
+        .filter_map(|line| {
+            let words: Vec<&str> = line.split(',').collect();
+            (words[2] == "1" && words[3] == "0").then(|| format!("{},{}\n", words[1], words[4]))
+        })
+        .collect();
+    fs::write(f.join("one.csv"), pooled).expect("write");
+    done(f, &["calibrate", "curve", "--panel", "panel.toml", "--powers", "one.csv", "-o", "one.toml"]);
+    let one = PanelProfile::read(&f.join("one.toml")).expect("profile");
+    let (by_region, by_one) = (efficiency(&mine, Some(truth.clone())), efficiency(&one, Some(truth)));
+    println!("ideal {ideal:.4}, by region {by_region:.4}, one curve {by_one:.4}");
+    assert!((by_region / ideal - 1.0).abs() < 0.01, "{by_region} of {ideal}");
+    assert!(by_one < by_region - 0.005, "{by_one} {by_region}: regions did not matter");
+}
+
+#[test]
+fn two_waves_of_bend_are_found_from_interferograms_and_from_coefficients() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    fs::write(f.join("panel.toml"), PROFILE.replace("0.93", "1.0")).expect("profile");
+    let profile = PanelProfile::read(&f.join("panel.toml")).expect("profile");
+    let grid = profile.grid().expect("grid");
+    let waves = [0.0, 0.1, -0.05, 0.5, 0.12, 0.0, 0.06, -0.1];
+    let radians: Vec<f64> = waves.iter().map(|w| w * TAU).collect();
+    let bend = zernike::wavefront(grid, WAVELENGTH, &radians, 4.6e-4, "bend").expect("bend");
+    let ends = bend.phase.iter().fold((f32::MAX, f32::MIN), |(l, h), &p| (l.min(p), h.max(p)));
+    assert!(f64::from(ends.1 - ends.0) > 2.0 * TAU, "{ends:?}");
+    done(f, &["calibrate", "flatness", "--panel", "panel.toml", "--steps", "5", "-o", "steps"]);
+    let mut random = Random::new(8, 0);
+    let faults = || Faults { bend: Some(bend.clone()), ..Faults::default() };
+    for k in 0..5 {
+        let (frame, _) = Frame::read(&f.join(format!("steps/step-{k:02}.png")), None, None).expect("step");
+        let seen = simulate(&frame, &Simulation { faults: faults(), ..Simulation::default() }, &Progress::new())
+            .expect("light");
+        let reads =
+            |u: &Complex32| (u + Complex32::new(0.8, 0.0)).norm_sqr() * (1.0 + 0.01 * normal(&mut random) as f32);
+        let values: Vec<f32> = seen.samples.iter().map(reads).collect();
+        npy::write_intensity(&f.join(format!("i{k}.npy")), 96, 64, &values).expect("write");
+    }
+    let interferograms = "i0.npy,i1.npy,i2.npy,i3.npy,i4.npy";
+    let base = ["calibrate", "flatness", "--panel", "panel.toml"];
+    done(f, &[&base[..], &["--interferograms", interferograms, "-o", "flat.npy", "--into", "flat.toml"]].concat());
+    let zernike = "--zernike=0,0.1,-0.05,0.5,0.12,0,0.06,-0.1";
+    done(f, &[&base[..], &[zernike, "--radius", "460um", "-o", "flat.png", "--into", "known.toml"]].concat());
+    let error = |correction: &Wavefront| {
+        let miss = |a: f32, b: f32| (f64::from(a + b) + PI).rem_euclid(TAU) - PI;
+        let squares: f64 = correction.phase.iter().zip(&bend.phase).map(|(a, b)| miss(*a, *b).powi(2)).sum();
+        (squares / grid.len() as f64).sqrt()
+    };
+    let measured = wavefront::read(&f.join("flat.npy"), None).expect("read");
+    assert_eq!(measured.wavelength, Some(WAVELENGTH));
+    println!("interferograms: {:.4} rad RMS = λ/{:.0}", error(&measured), TAU / error(&measured));
+    assert!(error(&measured) < TAU / 50.0, "{}", error(&measured));
+    // 256 grays a turn: half a step at most.
+    assert!(error(&wavefront::read(&f.join("flat.png"), Some(WAVELENGTH)).expect("read")) < TAU / 256.0);
+
+    // The profile carries its correction, and `encode` applies it once.
+    let flat = Field::new(grid, WAVELENGTH, vec![Complex32::new(1.0, 0.0); grid.len()]).expect("field");
+    npy::write_field(&f.join("flat-field.npy"), &flat, &npy::Content::default(), "test").expect("write");
+    for panel in ["flat.toml", "known.toml"] {
+        let report =
+            done(f, &["encode", "flat-field.npy", "--panel", panel, "--method", "kinoform", "-o", "frame.png"]);
+        assert!(report["correction"].is_string(), "{report}");
+        let (frame, _) = Frame::read(&f.join("frame.png"), None, None).expect("frame");
+        assert!(frame.metadata.applied.correction.is_some());
+        let seen = simulate(&frame, &Simulation { faults: faults(), ..Simulation::default() }, &Progress::new())
+            .expect("light");
+        let sum: Complex32 = seen.samples.iter().sum();
+        let share = f64::from(sum.norm_sqr()) / (grid.len() as f64).powi(2);
+        println!("{panel}: {share:.4} of the light straight on");
+        assert!(share > 0.99, "{panel}: {share}");
+    }
+    let plain = done(
+        f,
+        &[
+            "encode",
+            "flat-field.npy",
+            "--panel",
+            "flat.toml",
+            "--method",
+            "kinoform",
+            "--correction",
+            "none",
+            "-o",
+            "plain.png",
+        ],
+    );
+    assert!(plain["correction"].is_null());
+    refused(f, &["encode", "flat-field.npy", "--panel", "generic", "--correction", "flat.npy", "-o", "x.png"], "96×64");
+}
+
+#[test]
+fn cards_are_written_with_what_to_look_for() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    fs::write(f.join("panel.toml"), PROFILE.replace("width = 96", "width = 270").replace("64", "180"))
+        .expect("profile");
+    let report = done(f, &["calibrate", "check", "--panel", "panel.toml", "--distance", "60mm", "-o", "cards"]);
+    for name in ["half-turn", "lenses", "letters"] {
+        assert!(report[name].is_string(), "{report}");
+        Frame::read(&f.join(format!("cards/{name}.png")), None, None).expect("a frame with its metadata");
+    }
+    assert!(fs::read_to_string(f.join("cards/manifest.csv")).expect("manifest").contains("darkest"));
+}
+
+#[test]
+fn bad_calibrations_end_in_one_line() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    fs::write(f.join("panel.toml"), PROFILE).expect("profile");
+    let write = |name: &str, text: &str| fs::write(f.join(name), text).expect("write");
+    let curve = |powers: &str, word: &str| {
+        refused(f, &["calibrate", "curve", "--panel", "panel.toml", "--powers", powers, "-o", "new.toml"], word);
+    };
+    curve("none.csv", "none.csv");
+    let sweep = |power: &dyn Fn(f64) -> f64| -> String {
+        (0..128).map(|k| format!("{},{}\n", 2 * k, power(f64::from(k) / 127.0))).collect()
+    };
+    write("flat.csv", &sweep(&|_| 1.0));
+    curve("flat.csv", "no modulation");
+    write("beyond.csv", "0,1\n300,1\n");
+    curve("beyond.csv", "line 2: level 300");
+    write("gap.csv", "level,power\n0,1\n1,\n");
+    curve("gap.csv", "line 3: the power is missing");
+    write("few.csv", "0,0\n100,1\n200,0\n");
+    curve("few.csv", "3 powers");
+    let good = sweep(&|x| (3.3 * x).sin().powi(2));
+    write("good.csv", &good);
+    refused(f, &["calibrate", "curve", "--panel", "panel.toml", "--powers", "good.csv", "-o", "new.txt"], ".toml");
+    refused(f, &["calibrate", "curve", "--panel", "ti-dlp4710", "-o", "s"], "modulates amplitude");
+    refused(f, &["calibrate", "curve", "--panel", "panel.toml", "--levels", "5", "-o", "s"], "levels");
+    refused(f, &["calibrate", "curve", "--panel", "panel.toml", "--stripe", "0", "-o", "s"], "stripe");
+    refused(f, &["calibrate", "curve", "--panel", "panel.toml", "--hold=-1", "-o", "s"], "hold");
+    refused(
+        f,
+        &["calibrate", "curve", "--panel", "panel.toml", "--regions", "3x2", "--order", "zero", "-o", "s"],
+        "first",
+    );
+    let flatness = ["calibrate", "flatness", "--panel", "panel.toml", "-o", "new.npy"];
+    npy::write_intensity(&f.join("small.npy"), 5, 4, &[1.0; 20]).expect("write");
+    refused(f, &[&flatness[..], &["--interferograms", "small.npy,small.npy,small.npy"]].concat(), "5×4");
+    npy::write_intensity(&f.join("one.npy"), 96, 64, &[1.0; 96 * 64]).expect("write");
+    refused(f, &[&flatness[..], &["--interferograms", "one.npy,one.npy"]].concat(), "three");
+    refused(f, &[&flatness[..], &["--interferograms", "one.npy,one.npy,one.npy"]].concat(), "differ");
+    refused(f, &[&flatness[..], &["--zernike", "0,1"]].concat(), "--radius");
+    refused(f, &[&flatness[..], &["--zernike", "0,1", "--radius", "1mm", "--into", "x.txt"]].concat(), ".toml");
+    refused(f, &["calibrate", "flatness", "--steps", "2", "-o", "s"], "three");
+    refused(f, &["calibrate", "check", "--panel", "panel.toml", "--distance", "90m", "-o", "s"], "distance");
+    refused(f, &["calibrate"], "calibrate");
+
+    // Profiles whose curve or correction cannot be right.
+    let turned = PROFILE.replace(
+        "kind = \"linear\"\nlevels_for_2pi = 256",
+        "kind = \"polynomial\"\nunit = \"rad\"\ncoefficients = [0, 9, -6]",
+    );
+    write("turned.toml", &turned);
+    refused(f, &["calibrate", "check", "--panel", "turned.toml", "-o", "s"], "turns back at level");
+    write(
+        "lut.toml",
+        &PROFILE.replace("kind = \"linear\"\nlevels_for_2pi = 256", "kind = \"meadowlark-lut\"\nfile = \"slm.lut\""),
+    );
+    write("slm.lut", &(0..100).map(|g| format!("{g} {g}\n")).collect::<String>());
+    refused(f, &["calibrate", "check", "--panel", "lut.toml", "-o", "s"], "100 lines");
+    let measured = PROFILE.replace("kind = \"linear\"", "kind = \"linear\"\nwavelength = \"532nm\"");
+    write("green.toml", &measured);
+    refused(f, &["calibrate", "check", "--panel", "green.toml", "--wavelength", "1064nm", "-o", "s"], "1.064um");
+    write("corrected.toml", &format!("{PROFILE}[[correction]]\nfile = \"small.npy\"\nwavelength = \"532nm\"\n"));
+    refused(f, &["calibrate", "check", "--panel", "corrected.toml", "-o", "s"], "5×4");
+}
