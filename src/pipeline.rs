@@ -17,6 +17,7 @@ use crate::points::trace::{self, TraceReport, TraceSettings, Traced};
 use crate::points::{self, Channel, Placed, Placement, PointCloud, PointSource};
 use crate::progress::Progress;
 use crate::propagation::Aperture;
+use crate::random::Random;
 use crate::reconstruction::ViewSettings;
 use crate::scene::{SceneBvh, gltf};
 use glam::DVec3;
@@ -226,6 +227,35 @@ pub fn color_fields(
     let [red, green, blue] = each;
     let [long, middle, short] = lasers.wavelengths();
     Ok(ColorFields { computed: [one((red, long))?, one((green, middle))?, one((blue, short))?], gamut })
+}
+
+/// How sub-frames that are shown faster than the eye sees share a cloud's light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SubFrames {
+    /// All points in each, with phases of their own: speckle patterns that are averaged, contrast as 1/√N.
+    Phases,
+    /// Every N-th point in each: neighbours do not interfere where their spots overlap.
+    Sparse,
+}
+
+/// Points → the cloud's field in sub-frame `index` of `count`; phases are random by `seed` and sub-frame.
+pub fn sub_field(
+    cloud: &PointCloud,
+    channel: Channel,
+    (index, count, kind, seed): (usize, usize, SubFrames, u64),
+    panel: &Grid,
+    wavelength: f64,
+    settings: &HologramSettings,
+    progress: &Progress,
+) -> Result<Computed> {
+    let mut points = cloud.channel(channel);
+    let stream = seed.wrapping_add(1 + index as u64);
+    points.iter_mut().enumerate().for_each(|(i, p)| p.phase = Random::new(stream, i as u64).phase());
+    if kind == SubFrames::Sparse {
+        points = points.into_iter().skip(index).step_by(count.max(1)).collect();
+    }
+    let plan = hologram::plan(&points, panel, wavelength, settings)?;
+    hologram::compute(&points, panel, wavelength, &plan, progress)
 }
 
 /// Field → frame of drive levels for a panel.

@@ -52,7 +52,7 @@ pub(crate) enum Command {
     Encode(EncodeArgs),
     /// Reconstruct what is seen of a frame or a field: on a plane, or through an eye.
     #[command(
-        after_help = "Examples:\n  holodrive reconstruct frame.png --distance 120mm -o near.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus 150mm --pupil 4mm -o eye.png"
+        after_help = "Examples:\n  holodrive reconstruct frame.png --distance 120mm -o near.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus 150mm --pupil 4mm -o eye.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus 150mm --views 5x1 --eye-box 20mm -o eye.png"
     )]
     Reconstruct(ReconstructArgs),
     /// The whole way: scene, points, field or frame → pictures on the simulated panel, or light on a real one.
@@ -329,6 +329,18 @@ pub(crate) struct ReconstructArgs {
     /// Samples per pixel and side of the simulated panel: 1, or more to see replica orders.
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub(crate) subpixels: usize,
+    /// Fault of the simulated panel: phases of neighbouring pixels blend by a Gaussian of so many pixels.
+    #[arg(long, default_value_t = 0.0, value_name = "PIXELS")]
+    pub(crate) crosstalk: f64,
+    /// Fault of the simulated panel: its bend, as a file like those of encode's --correction.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) bend: Option<PathBuf>,
+    /// With --eye: a picture from each of so many places, beside each other × one above the other; names get -column-row.
+    #[arg(long, value_parser = size, value_name = "CxR", requires = "eye", requires = "eye_box")]
+    pub(crate) views: Option<(usize, usize)>,
+    /// Width and height over which --views moves the eye.
+    #[arg(long, value_parser = pitch, value_name = "LENGTH[,LENGTH]", requires = "views")]
+    pub(crate) eye_box: Option<[f64; 2]>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -357,6 +369,12 @@ pub(crate) struct ShowArgs {
     /// Show the frame even where a gamma table (night light) alters its levels; the report says what does.
     #[arg(long)]
     pub(crate) allow_altered_levels: bool,
+    /// Encode so many sub-frames with phases of their own; shown faster than an eye sees, their speckle averages out.
+    #[arg(long, default_value_t = 1, value_name = "N", conflicts_with = "wavelengths")]
+    pub(crate) subframes: usize,
+    /// Sub-frames share out the points instead of showing all.
+    #[arg(long, requires = "subframes")]
+    pub(crate) sparse: bool,
     /// What brings the levels to the screen.
     #[arg(long, value_enum, default_value_t = PresenterArg::Auto)]
     pub(crate) present: PresenterArg,

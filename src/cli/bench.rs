@@ -1,5 +1,6 @@
 //! `bench`: what there is, side by side.
 
+use super::args::StartArg;
 use super::bar::Bar;
 use super::report::{Report, seconds};
 use clap::{Args, Subcommand};
@@ -31,6 +32,9 @@ pub(crate) struct EncodingsArgs {
     /// Iterations of the methods that iterate.
     #[arg(long, default_value_t = 300, value_name = "N")]
     iterations: usize,
+    /// First phases of the methods with depths.
+    #[arg(long, value_enum, default_value_t = StartArg::Random, value_name = "PHASES")]
+    start: StartArg,
     /// A scene (.gltf, .glb) beside the flat picture; may be given again.
     #[arg(long, value_name = "FILE")]
     scene: Vec<PathBuf>,
@@ -88,7 +92,7 @@ fn table(args: &EncodingsArgs) -> Result<Report> {
                     continue;
                 }
                 bar.progress.check()?;
-                let effort = Effort { iterations: args.iterations };
+                let effort = Effort { iterations: args.iterations, start: super::encoding::start(args.start) };
                 rows.push(compare((name, picture), panel, encoding, effort, &bar.progress)?);
             }
         }

@@ -10,11 +10,11 @@ use glam::DVec2;
 use holodrive::field::{Field, npy};
 use holodrive::hologram::Computed;
 use holodrive::panel::simulated::Simulation;
-use holodrive::panel::{Frame, PanelProfile};
+use holodrive::panel::{Faults, Frame, PanelProfile, wavefront};
 use holodrive::pipeline::{self, Lit};
 use holodrive::points::{PointCloud, ply};
 use holodrive::propagation::{self, Kernel, Propagator};
-use holodrive::reconstruction::{self, Picture, Scale, View, ViewSettings, write_rgb_png};
+use holodrive::reconstruction::{self, Picture, Scale, View, ViewSettings, orders, write_rgb_png};
 use holodrive::units::{self, show_length};
 use holodrive::{Error, Result};
 use std::path::Path;
@@ -179,9 +179,22 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
             let profile = args.panel.as_deref().map(PanelProfile::find).transpose()?;
             let (frame, warnings) = Frame::read(&path, profile.as_ref(), args.wavelength)?;
             report.warn(warnings);
-            let simulation = Simulation { subsamples: args.subpixels, ..Simulation::default() };
+            let bend = args.bend.as_deref().map(|path| wavefront::read(path, None)).transpose()?;
+            let faults = Faults { crosstalk: args.crosstalk, bend, ..Faults::default() };
+            let simulation = Simulation { subsamples: args.subpixels, faults, ..Simulation::default() };
             let (field, mut settings) = pipeline::simulated_light(&frame, &simulation, &bar.progress)?;
             settings.block_zero_order(args.zero_order_stop, field.wavelength);
+            if let Some(encoding) = &frame.metadata.encoding {
+                let light = orders(&field, encoding);
+                let line = format!(
+                    "light        {:.1} % object, {:.1} % zero order, {:.1} % conjugate, {:.1} % elsewhere (simulated)",
+                    100.0 * light.object,
+                    100.0 * light.zero,
+                    100.0 * light.conjugate,
+                    100.0 * light.rest
+                );
+                report.add_serialised("orders", &light, line);
+            }
             let content = npy::Content { depth: frame.metadata.origin.depth, ..npy::Content::default() };
             (field, settings, content)
         }
@@ -197,6 +210,9 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
     };
     let half = args.half.map_or_else(|| seen_half(&field, &view, content.eye), |[x, y]| DVec2::new(x, y));
     let begin = Instant::now();
+    if let (Some(views), Some(eye_box)) = (args.views, args.eye_box) {
+        return super::parallax::views(args, (&field, &settings), &view, half, (views, eye_box), &bar.progress, report);
+    }
     bar.progress.start("reconstruct", 0);
     let picture = match args.size {
         Some(size) => reconstruction::picture(&field, &view, half, size, &settings, &bar.progress)?,

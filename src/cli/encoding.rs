@@ -76,7 +76,7 @@ fn encode_settings(
     Ok(settings)
 }
 
-fn start(typed: StartArg) -> PlaneStart {
+pub(super) fn start(typed: StartArg) -> PlaneStart {
     match typed {
         StartArg::Field => PlaneStart::Field,
         StartArg::Constant => PlaneStart::Constant,

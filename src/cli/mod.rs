@@ -10,11 +10,13 @@ mod encoding;
 mod light;
 mod load;
 mod monitors;
+mod parallax;
 mod report;
 mod scene_args;
 #[cfg(feature = "display")]
 mod screen;
 mod show;
+mod subframes;
 
 use args::{Cli, Command};
 use clap::Parser;

@@ -53,6 +53,9 @@ fn run(args: &ShowArgs) -> Result<Report> {
         }
         return in_color(args, &source, (&panel, lasers), begin, report);
     }
+    if args.subframes != 1 {
+        return in_sub_frames(args, &source, &panel, begin, report);
+    }
     // A monitor that is not there is found out before the work, not after it.
     #[cfg(feature = "display")]
     let screen = args.monitor.as_deref().map(super::screen::Screen::find).transpose()?;
@@ -110,6 +113,36 @@ fn run(args: &ShowArgs) -> Result<Report> {
     let total = begin.elapsed().as_secs_f64();
     report.add("seconds", total, format!("in all       {:>8}", seconds(total)));
     finish(report, out)
+}
+
+/// The whole way in several frames that are seen as one.
+fn in_sub_frames(args: &ShowArgs, source: &Input, panel: &Panel, begin: Instant, mut report: Report) -> Result<Report> {
+    super::subframes::check(args, panel)?;
+    #[cfg(feature = "display")]
+    let screen = args.monitor.as_deref().map(super::screen::Screen::find).transpose()?;
+    if matches!(source, Input::Frame(_) | Input::Field(_)) {
+        let what = "sub-frames are for scenes, point clouds and pictures with depth; a field has its phases";
+        return Err(Error::parameter("subframes", what));
+    }
+    files::output_folder(&args.output)?;
+    let bar = Bar::new();
+    let points = load_points(source, (&args.light, &args.placement, White::Auto), panel, &bar.progress, &mut report)?;
+    write_points(&args.output, &points, &mut report)?;
+    let frames = super::subframes::frames(args, panel, &points, &bar.progress, &mut report)?;
+    let to_frame = begin.elapsed().as_secs_f64();
+    report.add("to_frame_seconds", to_frame, format!("to the frames{:>8}", seconds(to_frame)));
+    #[cfg(feature = "display")]
+    if let Some(screen) = screen {
+        bar.progress.start("", 0);
+        screen.show(&frames.iter().collect::<Vec<_>>(), args, &bar.progress, &mut report)?;
+        return finish(report, &args.output);
+    }
+    let content = content(&points.cloud, &points.metadata);
+    super::subframes::look(&frames, args, &content, &bar.progress, &mut report)?;
+    drop(bar);
+    let total = begin.elapsed().as_secs_f64();
+    report.add("seconds", total, format!("in all       {:>8}", seconds(total)));
+    finish(report, &args.output)
 }
 
 /// The whole way in three colours.

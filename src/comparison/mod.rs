@@ -15,7 +15,8 @@
 //!
 //! - *PSNR* of the amplitudes against the greatest wanted one, over all planes and for the worst plane;
 //! - *SSIM* of the picture put together from its planes;
-//! - *efficiency*: share of the light on the panel that arrives where the picture stands;
+//! - *efficiency*: share of the light on the panel that arrives where the picture stands, summed over the planes (light that
+//!   crosses the parts of two planes counts at both: a pattern that aims badly may pass 100 %);
 //! - *speckle contrast*: σ/μ of seen over wanted intensity where the wanted amplitude is above a third of the greatest;
 //! - *time* of the encoding.
 //!
@@ -33,6 +34,7 @@ use crate::encode::{
 };
 use crate::error::Result;
 use crate::field::{Complex32, Field, Grid};
+use crate::panel::simulated::illuminate;
 use crate::panel::{Curve, Faults, Frame, Illumination, Modulation, PanelProfile, Response, Simulation, simulate};
 use crate::progress::Progress;
 use crate::propagation::{Propagator, Settings};
@@ -48,6 +50,8 @@ pub const WINDOW: f64 = 0.75;
 pub struct Effort {
     /// Iterations of the methods that iterate.
     pub iterations: usize,
+    /// First phases of the encodings by amplitudes on planes.
+    pub start: PlaneStart,
 }
 
 /// A panel to compare on.
@@ -88,7 +92,7 @@ pub struct Row {
 ///
 /// *Ideal*: 16 bits over a turn, all of each pixel active. *8 bit*: 256 levels over a turn, 93 % active, dead space that
 /// reflects fully. *1.6π*: the same with 256 levels over 1.6π, and phases of neighbouring pixels blended by a Gaussian of
-/// 0.3 pixels.
+/// 0.3 pixels; the profile says so, and the methods that iterate allow for it.
 ///
 /// # Errors
 /// [`crate::Error::Parameter`] for a size that no panel has.
@@ -97,11 +101,12 @@ pub fn panels(width: usize, height: usize) -> Result<Vec<ComparedPanel>> {
         let mut profile = PanelProfile::generic()?;
         profile.name = format!("{name} panel of the comparison");
         (profile.width, profile.height, profile.bits, profile.fill_factor) = (width, height, bits, fill_factor);
+        profile.crosstalk = crosstalk;
         profile.signal.width = width;
         profile.signal.height = height;
         profile.responses = vec![Response { wavelength: None, curve: Curve::Linear { levels_for_2pi } }];
         profile.grid()?;
-        Ok(ComparedPanel { name, profile, faults: Faults { crosstalk, ..Faults::default() } })
+        Ok(ComparedPanel { name, profile, faults: Faults::default() })
     };
     Ok(vec![
         panel("ideal", 16, 1.0, 65536.0, 0.0)?,
@@ -198,7 +203,7 @@ fn by_planes(
 ) -> Result<Frame> {
     let start = match settings.method {
         PlaneMethod::DoubleConstraint => PlaneStart::Quadratic,
-        _ => PlaneStart::Random { seed: 1 },
+        _ => effort.start,
     };
     let settings = PlaneEncoding { iterations: effort.iterations, start, ..settings };
     let (made, _) = encode_planes(planes, wavelength, profile, &settings, (None, Illumination::Normal), progress)?;
@@ -220,13 +225,29 @@ fn by_field(
         _ => {}
     }
     let phase = encoding.modulation() == Modulation::Phase;
+    let one_side = matches!(encoding, Encoding::SingleSideBand(_));
     let mut settings = EncodeSettings::new(encoding);
     if phase {
         let angle = |limit: f64| (0.5 * limit * field.wavelength).asin();
         let angles = [angle(field.grid.limit_x()), angle(field.grid.limit_y())];
         settings.illumination = blaze_and_lens(angles, None, field.wavelength)?;
     }
-    Ok(encode(field, profile, &settings, progress)?.frame)
+    if !one_side {
+        return Ok(encode(field, profile, &settings, progress)?.frame);
+    }
+    // The upper half of the band has its middle at half the limit: there the object goes, and light from the other side
+    // brings it back.
+    let middle = [0.0, 0.5 * field.grid.limit_y()];
+    let mut moved = field.clone();
+    illuminate(&mut moved.samples, field.grid, field.wavelength, Illumination::Plane { frequency: middle })?;
+    let mut frame = encode(&moved, profile, &settings, progress)?.frame;
+    if let Some(record) = &mut frame.metadata.encoding {
+        record.illumination = Illumination::Plane { frequency: middle.map(|f| -f) };
+        if let Some(aperture) = &mut record.aperture {
+            aperture.center = [0, 1].map(|axis| aperture.center[axis] - middle[axis]);
+        }
+    }
+    Ok(frame)
 }
 
 /// What is seen of a frame.

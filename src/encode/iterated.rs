@@ -6,7 +6,7 @@ use super::iterative::{
 };
 use super::{DoublePhase, EncodedPattern, Interlace, band, double_phase};
 use crate::error::{Error, Result};
-use crate::field::{Complex32, Field};
+use crate::field::{Complex32, Field, Grid};
 use crate::panel::{EncodingRecord, Illumination, Modulation, PanelProfile, Pattern};
 use crate::progress::Progress;
 use crate::propagation::{Aperture, propagate};
@@ -57,7 +57,7 @@ impl PlaneMethod {
 }
 
 /// The phases from which amplitudes on planes are sought.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlaneStart {
     /// The field's own: a warm start. For pictures as [`PlaneStart::Quadratic`].
     Field,
@@ -68,7 +68,7 @@ pub enum PlaneStart {
         /// The seed.
         seed: u64,
     },
-    /// A lens that spreads each point's light over about an eighth of the panel's side at the nearest plane: no speckle.
+    /// A lens that carries the panel's rectangle into three quarters of it at the middle depth: no speckle.
     Quadratic,
     /// Random, changing smoothly over 16 pixels.
     Smooth {
@@ -186,6 +186,13 @@ pub(super) fn of_planes(
         other => other,
     };
     let start = start(first, &depths, profile, wavelength);
+    let mut planes = planes;
+    if settings.method == PlaneMethod::DoubleConstraint {
+        let (grid, length) = (profile.grid()?, focal_length(&depths, profile, wavelength));
+        for plane in planes.iter_mut().filter(|plane| plane.phase.is_none()) {
+            plane.phase = Some(smooth_phases(&grid, plane.z, length, wavelength));
+        }
+    }
     let found = run(&Target::Amplitude(planes), settings, start, profile, wavelength, illumination, progress)?;
     let settings = PlaneEncoding { depths, ..settings.clone() };
     let record = record(settings.method.name(), &found, None, illumination, parameters(&settings));
@@ -197,15 +204,27 @@ fn start(start: PlaneStart, depths: &[f64], profile: &PanelProfile, wavelength: 
         PlaneStart::Field | PlaneStart::Constant => Start::Constant,
         PlaneStart::Random { seed } => Start::Random { seed },
         PlaneStart::Smooth { seed } => Start::Smooth { seed, length: 16.0 },
-        PlaneStart::Quadratic => {
-            // A lens of focal length f magnifies the panel by 1 − z/f at depth z: f = −8·z makes it 9/8 as large. On the
-            // panel itself nothing spreads; then any lens does.
-            let nearest = depths.iter().map(|z| z.abs()).fold(f64::INFINITY, f64::min);
-            let least =
-                profile.width.max(profile.height) as f64 * profile.pitch_x.max(profile.pitch_y).powi(2) / wavelength;
-            Start::Quadratic { focal_length: (8.0 * nearest).max(least) }
-        }
+        PlaneStart::Quadratic => Start::Quadratic { focal_length: focal_length(depths, profile, wavelength) },
     }
+}
+
+/// Focal length of the lens that carries the panel's rectangle into three quarters of it at the middle depth: the wave's
+/// width at depth z is (1 + z/f) times that on the panel. On the panel itself any weak lens does.
+fn focal_length(depths: &[f64], profile: &PanelProfile, wavelength: f64) -> f64 {
+    let middle = depths.iter().sum::<f64>() / depths.len().max(1) as f64;
+    let weak = profile.width.max(profile.height) as f64 * profile.pitch_x.max(profile.pitch_y).powi(2) / wavelength;
+    // A lens that the pixels cannot bend is none.
+    (-4.0 * middle).abs().max(weak) * if middle > 0.0 { -1.0 } else { 1.0 }
+}
+
+/// Phases [rad] of that lens' wave at depth z: smooth, and the same light at all depths.
+fn smooth_phases(grid: &Grid, z: f64, focal_length: f64, wavelength: f64) -> Vec<f32> {
+    let radius = focal_length + z;
+    let one = |i: usize| {
+        let (x, y) = (grid.x(i % grid.width), grid.y(i / grid.width));
+        (((x * x + y * y) / (2.0 * wavelength * radius)).rem_euclid(1.0) * std::f64::consts::TAU) as f32
+    };
+    (0..grid.len()).map(one).collect()
 }
 
 fn run(
@@ -224,7 +243,7 @@ fn run(
     }
     let projections = GerchbergSaxton {
         iterations,
-        weighting: if settings.method == PlaneMethod::Weighted { 0.6 } else { 0.0 },
+        weighting: if settings.method == PlaneMethod::Weighted { 0.1 } else { 0.0 },
         constraint: match settings.method {
             PlaneMethod::DoubleConstraint => Constraint::AmplitudeAndPhase,
             _ => Constraint::Amplitude,

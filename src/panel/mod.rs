@@ -28,7 +28,7 @@ pub use packing::{Packing, SignalLayout, VideoFrame};
 pub use profile::{CorrectionFile, PanelKind, PanelProfile};
 pub use regional::PixelCurve;
 pub use response::{Curve, DriveCurve, Modulation, PhaseSign, Response};
-pub use simulated::{Faults, Simulation, simulate};
+pub use simulated::{Faults, Residue, Simulation, simulate, simulate_sequence};
 pub use wavefront::Wavefront;
 
 use crate::error::{Error, Result};

@@ -82,6 +82,9 @@ pub struct PanelProfile {
     pub refresh: Option<f64>,
     /// Start of the monitor name or serial in its EDID, by which it is found among monitors.
     pub edid: Option<String>,
+    /// Standard deviation of the Gaussian by which neighbouring pixels' phases blend [pixels]; 0 where it is not known.
+    #[serde(default)]
+    pub crosstalk: f64,
     /// Files of wavefront corrections.
     #[serde(default)]
     pub corrections: Vec<CorrectionFile>,

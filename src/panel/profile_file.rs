@@ -65,6 +65,8 @@ struct ProfileFile {
     fill_factor: f64,
     #[serde(default = "one")]
     dead_space: f64,
+    #[serde(default)]
+    crosstalk: f64,
     wavelengths: Vec<Quantity>,
     #[serde(default)]
     phase_sign: PhaseSign,
@@ -178,6 +180,9 @@ pub(super) fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
     if file.width == 0 || file.height == 0 || file.width > 1 << 16 || file.height > 1 << 16 {
         return at.refuse(format!("width × height = {}×{} must be 1 … 65536 each", file.width, file.height));
     }
+    if !(0.0..=8.0).contains(&file.crosstalk) {
+        return at.refuse(format!("crosstalk = {} must be 0 … 8 pixels", file.crosstalk));
+    }
     if !(1..=16).contains(&file.bits) {
         return at.refuse(format!("bits = {} must be 1 … 16", file.bits));
     }
@@ -210,6 +215,7 @@ pub(super) fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
         "bits",
         "fill_factor",
         "dead_space",
+        "crosstalk",
         "wavelengths",
         "phase_sign",
         "settle_time",
@@ -258,6 +264,7 @@ pub(super) fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
         refresh: file.refresh.map(|t| at.read("refresh", &t, units::frequency)).transpose()?,
         edid: file.edid,
         corrections,
+        crosstalk: file.crosstalk,
         unverified: file.unverified,
     })
 }
@@ -406,6 +413,7 @@ mod tests {
         profile.pitch_y = 6.4e-6;
         profile.phase_sign = PhaseSign::Decreasing;
         profile.settle_time = Some(0.0123456789);
+        profile.crosstalk = 0.35;
         profile.corrections = vec![CorrectionFile { file: "flat.npy".into(), wavelength: Some(532.123456789e-9) }];
         let polynomial = |range: f64| Curve::Polynomial { coefficients: vec![0.0, range, 0.1] };
         let curves = vec![polynomial(6.0), polynomial(6.1), polynomial(6.2)];

@@ -32,6 +32,9 @@ impl PanelProfile {
         }
         let _ = writeln!(out, "bits = {}", self.bits);
         let _ = writeln!(out, "fill_factor = {:?}\ndead_space = {:?}", self.fill_factor, self.dead_space);
+        if self.crosstalk > 0.0 {
+            let _ = writeln!(out, "crosstalk = {:?}", self.crosstalk);
+        }
         let _ = writeln!(out, "wavelengths = [{}]", joined(&self.wavelengths, |w| format!("\"{}\"", length(*w))));
         if self.phase_sign == PhaseSign::Decreasing {
             out += "phase_sign = \"decreasing\"\n";

@@ -35,7 +35,8 @@ pub struct Faults {
     pub response: Option<Response>,
     /// The panel's bend: the phase that it adds [rad].
     pub bend: Option<Wavefront>,
-    /// Standard deviation of the Gaussian by which neighbouring pixels' phases (or amplitudes) blend [pixels].
+    /// Standard deviation of the Gaussian by which neighbouring pixels' phases (or amplitudes) blend [pixels], beside the
+    /// profile's own.
     ///
     /// Fringing fields blur the phase itself, so a wrap from 2π to 0 becomes a steep slope through all phases between.
     pub crosstalk: f64,
@@ -45,6 +46,18 @@ pub struct Faults {
     pub amplitude_coupling: f64,
     /// Amplitude of the dead space against the active area's; absent: the profile's.
     pub dead_space: Option<f64>,
+    /// What is left of the frame before, where the light comes before the panel has settled.
+    pub residue: Option<Residue>,
+}
+
+/// A frame that has not quite gone.
+#[derive(Clone, Debug)]
+pub struct Residue {
+    /// Its levels.
+    pub levels: Vec<u16>,
+    /// Share of the way from the new phase (or amplitude) back to the old one, 0 … 1: exp(−t/τ) of a panel that relaxes
+    /// with time constant τ, lit at t.
+    pub share: f64,
 }
 
 impl Default for Simulation {
@@ -55,7 +68,15 @@ impl Default for Simulation {
 
 impl Default for Faults {
     fn default() -> Self {
-        Self { response: None, bend: None, crosstalk: 0.0, phase_scale: 1.0, amplitude_coupling: 0.0, dead_space: None }
+        Self {
+            response: None,
+            bend: None,
+            crosstalk: 0.0,
+            phase_scale: 1.0,
+            amplitude_coupling: 0.0,
+            dead_space: None,
+            residue: None,
+        }
     }
 }
 
@@ -83,9 +104,10 @@ pub fn simulate(frame: &Frame, settings: &Simulation, progress: &Progress) -> Re
     };
     let n = settings.subsamples;
     let dead = Complex32::new(faults.dead_space.unwrap_or(profile.dead_space) as f32, 0.0);
-    let cells = if faults.crosstalk > 0.0 { n } else { 1 };
+    let crosstalk = faults.crosstalk.hypot(profile.crosstalk);
+    let cells = if crosstalk > 0.0 { n } else { 1 };
     progress.start("simulated panel", (cells * cells + 1) as u64);
-    let values = cell_values(frame, &curve, cells, faults)?;
+    let values = cell_values(frame, &curve, cells, faults, crosstalk)?;
     let modulate = |value: f32| modulated(value, curve.modulation(), faults);
     let mut samples = if n == 1 {
         let fill = profile.fill_factor as f32;
@@ -107,6 +129,26 @@ pub fn simulate(frame: &Frame, settings: &Simulation, progress: &Progress) -> Re
     Field::new(grid, wavelength, samples)
 }
 
+/// The fields behind a panel that shows frames one after another and over again, such as a colour for each laser, each
+/// with what `share` leaves of the frame before (see [`Residue::share`]).
+///
+/// # Errors
+/// As [`simulate`]; [`Error::Parameter`] when the frames are not of one size.
+pub fn simulate_sequence(
+    frames: &[&Frame],
+    settings: &Simulation,
+    share: f64,
+    progress: &Progress,
+) -> Result<Vec<Field>> {
+    let before = |k: usize| frames[(k + frames.len() - 1) % frames.len()];
+    let one = |k: usize| {
+        let residue = Some(Residue { levels: before(k).levels.clone(), share });
+        let faults = Faults { residue, ..settings.faults.clone() };
+        simulate(frames[k], &Simulation { faults, ..settings.clone() }, progress)
+    };
+    (0..frames.len()).map(one).collect()
+}
+
 fn check(frame: &Frame, grid: Grid, settings: &Simulation) -> Result<()> {
     let faults = &settings.faults;
     if frame.levels.len() != grid.len() || (frame.width, frame.height) != (grid.width, grid.height) {
@@ -123,6 +165,12 @@ fn check(frame: &Frame, grid: Grid, settings: &Simulation) -> Result<()> {
     if !(0.0..=1.0).contains(&faults.amplitude_coupling) || !(0.0..=1.0).contains(&faults.dead_space.unwrap_or(0.0)) {
         return Err(Error::parameter("amplitude_coupling, dead_space", "must be 0 … 1"));
     }
+    if let Some(residue) = &faults.residue {
+        if residue.levels.len() != grid.len() || !(0.0..=1.0).contains(&residue.share) {
+            let what = format!("{} levels and a share of {}", residue.levels.len(), residue.share);
+            return Err(Error::parameter("residue", what));
+        }
+    }
     if !faults.phase_scale.is_finite() {
         return Err(Error::parameter("phase_scale", "must be finite"));
     }
@@ -130,13 +178,18 @@ fn check(frame: &Frame, grid: Grid, settings: &Simulation) -> Result<()> {
 }
 
 /// Unwrapped phase [rad] or amplitude of each cell: `cells × cells` cells a pixel, blended by the crosstalk.
-fn cell_values(frame: &Frame, curve: &PixelCurve, cells: usize, faults: &Faults) -> Result<Vec<f32>> {
+fn cell_values(frame: &Frame, curve: &PixelCurve, cells: usize, faults: &Faults, crosstalk: f64) -> Result<Vec<f32>> {
     let count = curve.mean.levels();
     if let Some(i) = frame.levels.iter().position(|&l| usize::from(l) >= count) {
         let what = format!("level {} at pixel {i}; the panel has {count}", frame.levels[i]);
         return Err(Error::parameter("frame", what));
     }
-    let pixels = curve.values(&frame.levels, frame.width)?;
+    let mut pixels = curve.values(&frame.levels, frame.width)?;
+    if let Some(residue) = &faults.residue {
+        let before = curve.values(&residue.levels, frame.width)?;
+        let share = residue.share as f32;
+        pixels.par_iter_mut().zip(&before).for_each(|(now, before)| *now += share * (before - *now));
+    }
     let (width, height) = (frame.width * cells, frame.height * cells);
     let mut values = vec![0.0; width * height];
     values.par_chunks_mut(width).enumerate().for_each(|(row, values)| {
@@ -145,14 +198,17 @@ fn cell_values(frame: &Frame, curve: &PixelCurve, cells: usize, faults: &Faults)
             *value = pixels[column / cells];
         }
     });
-    if faults.crosstalk > 0.0 {
-        let kernel = gaussian(faults.crosstalk * cells as f64);
-        values = blur_rows(&values, width, &kernel);
-        values = transpose(&values, width);
-        values = blur_rows(&values, height, &kernel);
-        values = transpose(&values, height);
-    }
-    Ok(values)
+    Ok(if crosstalk > 0.0 { blurred(&values, width, crosstalk * cells as f64) } else { values })
+}
+
+/// Values of an array of that width blended by a Gaussian of standard deviation `sigma` [samples]; beyond the border the
+/// border's values go on.
+pub(crate) fn blurred(values: &[f32], width: usize, sigma: f64) -> Vec<f32> {
+    let kernel = gaussian(sigma);
+    let rows = blur_rows(values, width, &kernel);
+    let turned = transpose(&rows, width);
+    let height = values.len() / width;
+    transpose(&blur_rows(&turned, height, &kernel), height)
 }
 
 /// Half of a Gaussian's weights, integrated over cells: weight i is the share that lands i cells away; sums to one with

@@ -1,6 +1,7 @@
-//! How good a picture is: PSNR, SSIM, speckle contrast.
+//! How good a picture is: PSNR, SSIM, speckle contrast, uniformity; how good a field: its normalised error.
 
 use super::Picture;
+use crate::field::{Complex32, Complex64};
 
 /// Peak signal-to-noise ratio of values in [0, 1]: −10·log₁₀(mean squared difference) [dB]; infinite when equal.
 pub fn psnr(a: &[f32], b: &[f32]) -> f64 {
@@ -112,6 +113,30 @@ pub fn speckle_contrast(values: &[f32]) -> f64 {
     if mean > 0.0 { variance.sqrt() / mean } else { 0.0 }
 }
 
+/// Uniformity 1 − (max − min)/(max + min) of intensities that should be equal; 1 where they are (Di Leonardo, Ianni & Ruocco,
+/// *Optics Express* 15, 1913 (2007)).
+pub fn uniformity(values: &[f32]) -> f64 {
+    let (low, high) =
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v.into()), h.max(v.into())));
+    if high + low > 0.0 { 1.0 - (high - low) / (high + low) } else { 0.0 }
+}
+
+/// Normalised squared error of a wave field, min over complex factors c of Σ|c·seen − wanted|²/Σ|wanted|²; 0 … 1.
+///
+/// A piston and the brightness are taken out by c; what is left is wrong in amplitude or phase somewhere.
+pub fn field_error(seen: &[Complex32], wanted: &[Complex32]) -> f64 {
+    assert_eq!(seen.len(), wanted.len(), "fields of one size are compared");
+    let wide = |u: &Complex32| Complex64::new(u.re.into(), u.im.into());
+    let (mut cross, mut own, mut norm) = (Complex64::new(0.0, 0.0), 0.0, 0.0);
+    for (g, u) in seen.iter().zip(wanted) {
+        let (g, u) = (wide(g), wide(u));
+        cross += g.conj() * u;
+        own += g.norm_sqr();
+        norm += u.norm_sqr();
+    }
+    if own > 0.0 && norm > 0.0 { (1.0 - cross.norm_sqr() / (own * norm)).max(0.0) } else { 1.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -133,6 +158,20 @@ mod tests {
         assert!(ssim(&noise, &other, 20, 20) < 0.3);
         let inverted: Vec<f32> = noise.iter().map(|v| 1.0 - v).collect();
         assert!(ssim(&noise, &inverted, 20, 20) < 0.0);
+    }
+
+    #[test]
+    fn uniformity_and_field_error_of_known_values() {
+        assert!((uniformity(&[2.0; 9]) - 1.0).abs() < 1e-12);
+        assert!((uniformity(&[1.0, 3.0]) - 0.5).abs() < 1e-12);
+        let wanted: Vec<Complex32> =
+            (0..100).map(|i| Complex32::from_polar(1.0 + 0.01 * i as f32, 0.3 * i as f32)).collect();
+        let turned: Vec<Complex32> = wanted.iter().map(|u| u * Complex32::from_polar(0.2, 1.1)).collect();
+        assert!(field_error(&turned, &wanted) < 1e-6);
+        // Half of the samples of the wrong sign, in pairs of equal modulus: nothing is left in common.
+        let pairs: Vec<Complex32> = (0..100).map(|i| wanted[i / 2]).collect();
+        let half: Vec<Complex32> = pairs.iter().enumerate().map(|(i, u)| if i % 2 == 0 { *u } else { -u }).collect();
+        assert!((field_error(&half, &pairs) - 1.0).abs() < 1e-9);
     }
 
     #[test]

@@ -8,10 +8,12 @@
 pub mod colour;
 pub mod flat_field;
 pub mod metrics;
+pub mod orders;
 mod picture;
 
 pub use colour::{ColorLight, ColorPicture};
 pub use flat_field::Cone;
+pub use orders::{Orders, orders};
 pub use picture::{Picture, Scale, read_gray, write_rgb_png};
 
 use crate::error::{Error, Result};

@@ -57,6 +57,20 @@ impl Picture {
         Self { width, height, values: sums.into_iter().map(|v| v as f32).collect() }
     }
 
+    /// The mean of pictures of one size: what a slow eye sees of frames shown one after another. None of none.
+    ///
+    /// # Panics
+    /// When their sizes differ.
+    pub fn mean(pictures: &[Self]) -> Option<Self> {
+        let first = pictures.first()?;
+        let mut values = vec![0.0; first.values.len()];
+        for picture in pictures {
+            assert!((picture.width, picture.height) == (first.width, first.height), "pictures of one size");
+            values.iter_mut().zip(&picture.values).for_each(|(sum, v)| *sum += v / pictures.len() as f32);
+        }
+        Some(Self { values, ..*first })
+    }
+
     /// The value shown as white.
     pub fn white(&self, scale: Scale) -> f32 {
         match scale {

@@ -45,7 +45,7 @@ impl Default for GerchbergSaxton {
     fn default() -> Self {
         Self {
             iterations: 100,
-            weighting: 0.6,
+            weighting: 0.1,
             constraint: Constraint::Amplitude,
             efficiency: 0.5,
             start: Start::Random { seed: 1 },
@@ -117,7 +117,8 @@ pub fn gerchberg_saxton(
     for iteration in 0..settings.iterations {
         progress.check()?;
         let step = |i: usize| light.total[i] + change[i] * size;
-        let next: Vec<f32> = (0..count).into_par_iter().map(|i| model.wish(i, step(i))).collect();
+        let next: Vec<f32> =
+            (0..count).into_par_iter().map(|i| model.wish(i, step(i), wish[i], light.modulated[i])).collect();
         let next_light = model.light(&next);
         let next_judged = problem.judge(&next_light.total);
         if next_judged.error <= judged.error {

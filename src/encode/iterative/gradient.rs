@@ -67,7 +67,7 @@ pub fn gradient_descent(
     let mut light = model.light(&wish);
     let mut judged = problem.judge(&light.total);
     let mut adam = Adam::new(wish.len());
-    adam.turn(&gradient_field(&problem, &judged), &light);
+    adam.turn(&slopes(&model, &gradient_field(&problem, &judged), &light));
     let mut history = vec![judged.error];
     let (mut rejected, mut trust) = (0, 1.0);
     for iteration in 0..settings.iterations {
@@ -81,7 +81,7 @@ pub fn gradient_descent(
             (wish, light, judged) = (next, next_light, next_judged);
             trust = f64::min(1.0, 1.1 * trust);
             if iteration + 1 < settings.iterations {
-                adam.turn(&gradient_field(&problem, &judged), &light);
+                adam.turn(&slopes(&model, &gradient_field(&problem, &judged), &light));
             }
         } else {
             rejected += 1;
@@ -124,6 +124,12 @@ pub(super) fn gradient_field(problem: &Problem<'_>, judged: &Judged) -> Vec<Comp
     sum.unwrap_or_default()
 }
 
+/// ∂L/∂wish of all pixels.
+pub(super) fn slopes(model: &PanelModel, pulled: &[Complex32], light: &Light) -> Vec<f32> {
+    let each = pulled.par_iter().zip(&light.modulated).map(|(pulled, modulated)| slope(*pulled, *modulated));
+    model.pulled_back(each.collect())
+}
+
 /// ∂L/∂φ of one pixel whose modulated light is given.
 pub(super) fn slope(pulled: Complex32, modulated: Complex32) -> f32 {
     -2.0 * (pulled.conj() * modulated).im
@@ -145,13 +151,12 @@ impl Adam {
     }
 
     /// Takes in the slopes at new phases.
-    fn turn(&mut self, pulled: &[Complex32], light: &Light) {
+    fn turn(&mut self, slopes: &[f32]) {
         // Slopes scale with 1/pixels and may underflow squared in single precision: they are taken times the pixel count.
         let gain = self.slopes.len() as f32;
         self.counts = self.counts.map(|count| count + 1);
-        let work = self.slopes.par_iter_mut().zip(&mut self.moments).zip(pulled.par_iter().zip(&light.modulated));
-        work.for_each(|((kept, moment), (pulled, modulated))| {
-            let slope = slope(*pulled, *modulated) * gain;
+        self.slopes.par_iter_mut().zip(&mut self.moments).zip(slopes).for_each(|((kept, moment), slope)| {
+            let slope = slope * gain;
             *kept = slope;
             moment[0] = Self::BETA[0] * moment[0] + (1.0 - Self::BETA[0]) * slope;
             moment[1] = Self::BETA[1] * moment[1] + (1.0 - Self::BETA[1]) * slope * slope;

@@ -283,7 +283,7 @@ impl Problem<'_> {
         rejected: usize,
     ) -> Result<Solution> {
         let judged = self.judge(&model.light(wish).total);
-        let phase = wish.par_iter().map(|&p| model.show(p).0).collect();
+        let phase = wish.par_iter().map(|&p| model.show(p).0.rem_euclid(TAU)).collect();
         let efficiency = judged.counted / (self.planes.count() * model.grid.len()) as f64;
         let psnr = self.psnr(&judged);
         let pattern = PhasePattern::new(model.grid, wavelength, phase)?;

@@ -1,9 +1,9 @@
-//! The panel inside the loop: what light a wished phase becomes, with the levels, the curve, the range, the dead space and
-//! the wave that falls on it.
+//! The panel inside the loop: what light a wished phase becomes, with the levels, the curve, the range, the dead space, the
+//! crosstalk and the wave that falls on it.
 
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Complex64, Grid};
-use crate::panel::simulated::illuminate;
+use crate::panel::simulated::{blurred, illuminate};
 use crate::panel::{DriveCurve, Illumination, Modulation, PanelProfile};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
@@ -11,8 +11,12 @@ use std::f32::consts::TAU;
 /// A phase panel as an iteration sees it.
 pub(super) struct PanelModel {
     pub(super) grid: Grid,
-    /// Phase that the panel shows for a wish in each of the bins of one turn, and its phasor times the fill factor.
+    /// For a wish in each of the bins of one turn: the phase that the panel shows, unwrapped as its curve has it, and its
+    /// phasor times the fill factor.
     shown: Vec<(f32, Complex32)>,
+    fill: f32,
+    /// Standard deviation of the Gaussian that blends neighbouring pixels' phases [pixels].
+    crosstalk: f64,
     /// Light of the dead space, seen along the axis: (1 − F)·d.
     dead: f32,
     /// The wave that falls on each pixel; absent: 1 everywhere.
@@ -64,7 +68,7 @@ impl PanelModel {
                 let wish = (bin as f64 + 0.5) / Self::BINS as f64 * std::f64::consts::TAU;
                 let level = curve.nearest(wish).0;
                 let phasor: Complex64 = curve.phasor(level) * fill;
-                let phase = curve.values()[usize::from(level)].rem_euclid(std::f64::consts::TAU);
+                let phase = curve.values()[usize::from(level)];
                 (phase as f32, Complex32::new(phasor.re as f32, phasor.im as f32))
             })
             .collect();
@@ -77,10 +81,11 @@ impl PanelModel {
             }
         };
         let dead = ((1.0 - fill) * profile.dead_space) as f32;
-        Ok(Self { grid, shown, dead, incident, range: range(&curve) })
+        let (fill, crosstalk) = (fill as f32, profile.crosstalk);
+        Ok(Self { grid, shown, fill, crosstalk, dead, incident, range: range(&curve) })
     }
 
-    /// Phase that the panel shows for a wished phase [rad], in [0, 2π), with its phasor times the fill factor.
+    /// Phase that the panel shows for a wished phase [rad], as its curve counts it, with its phasor times the fill factor.
     pub(super) fn show(&self, wish: f32) -> (f32, Complex32) {
         let turn = wish * (1.0 / TAU);
         let bin = ((turn - turn.floor()) * Self::BINS as f32) as usize;
@@ -90,22 +95,43 @@ impl PanelModel {
     /// The light of a panel with these wishes.
     pub(super) fn light(&self, wishes: &[f32]) -> Light {
         let one = Complex32::new(1.0, 0.0);
-        let each = |(i, wish): (usize, &f32)| {
+        let lit = |i: usize, phasor: Complex32| {
             let incident = self.incident.as_ref().map_or(one, |wave| wave[i]);
-            let modulated = self.show(*wish).1 * incident;
+            let modulated = phasor * incident;
             (modulated + incident * self.dead, modulated)
         };
-        let (total, modulated) = wishes.par_iter().enumerate().map(each).unzip();
+        let (total, modulated) = if self.crosstalk > 0.0 {
+            let phases: Vec<f32> = wishes.par_iter().map(|&wish| self.show(wish).0).collect();
+            let phases = blurred(&phases, self.grid.width, self.crosstalk);
+            phases.par_iter().enumerate().map(|(i, &p)| lit(i, Complex32::from_polar(self.fill, p))).unzip()
+        } else {
+            wishes.par_iter().enumerate().map(|(i, &wish)| lit(i, self.show(wish).1)).unzip()
+        };
         Light { total, modulated }
     }
 
-    /// The wish of pixel `i` whose light comes nearest to a wished light of any modulus.
-    pub(super) fn wish(&self, i: usize, light: Complex32) -> f32 {
+    /// Slopes of what the panel shows as slopes of its pixels' wishes: crosstalk spreads each over its neighbours.
+    pub(super) fn pulled_back(&self, slopes: Vec<f32>) -> Vec<f32> {
+        if self.crosstalk > 0.0 { blurred(&slopes, self.grid.width, self.crosstalk) } else { slopes }
+    }
+
+    /// The wish of pixel `i` whose light comes nearest to a wished light of any modulus, from the wish that it has and the
+    /// light that this gives.
+    ///
+    /// With crosstalk no wish has its own light; it moves by as much as its light should turn.
+    pub(super) fn wish(&self, i: usize, light: Complex32, before: f32, modulated: Complex32) -> f32 {
         let wished = match &self.incident {
             None => light - self.dead,
             Some(wave) => light * wave[i].conj() - self.dead * wave[i].norm_sqr(),
         };
-        wished.im.atan2(wished.re)
+        if self.crosstalk == 0.0 {
+            return wished.im.atan2(wished.re);
+        }
+        let shown = self.incident.as_ref().map_or(modulated, |wave| modulated * wave[i].conj());
+        let turn = wished * shown.conj();
+        // Where the panel has no more range the wish must not run away.
+        let moved = before + turn.im.atan2(turn.re);
+        self.range.map_or(moved, |range| range.nearest(moved))
     }
 
     /// Phases of a panel in normal light turned into those that make the same light of the incident wave.

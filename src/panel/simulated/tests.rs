@@ -29,6 +29,7 @@ fn panel(width: usize, height: usize, fill_factor: f64, dead_space: f64, curve: 
         refresh: None,
         edid: None,
         corrections: Vec::new(),
+        crosstalk: 0.0,
         unverified: Vec::new(),
     }
 }
@@ -165,7 +166,7 @@ fn crosstalk_blurs_the_phase_by_an_error_function() {
     let faults = Faults { crosstalk: 1.5, ..Faults::default() };
     let curve = profile.pixel_curve(WAVELENGTH).expect("curve").0;
     for cells in [1, 4] {
-        let values = cell_values(&frame, &curve, cells, &faults).expect("cells");
+        let values = cell_values(&frame, &curve, cells, &faults, 1.5).expect("cells");
         for (i, value) in values[64 * cells..][..64 * cells].iter().enumerate() {
             let x = (i as f64 + 0.5) / cells as f64 - 32.0;
             let truth = TAU * 200.0 / 256.0 * 0.5 * (1.0 + libm::erf(x / 1.5 / std::f64::consts::SQRT_2));
@@ -243,4 +244,28 @@ fn illumination_has_its_direction_and_its_limit() {
     assert!(matches!(lit(Illumination::Point { position: [0.0, 0.0, -1e-4] }, 1), Err(Error::Undersampled { .. })));
     assert!(matches!(lit(Illumination::Point { position: [0.0; 3] }, 1), Err(Error::Parameter { .. })));
     assert!(matches!(lit(Illumination::Plane { frequency: [2e6, 0.0] }, 16), Err(Error::Parameter { .. })));
+}
+
+#[test]
+fn colours_in_sequence_leave_what_has_not_settled() {
+    let profile = panel(6, 5, 1.0, 0.0, turn());
+    let frames: Vec<Frame> = [(640e-9, 64), (532e-9, 128), (450e-9, 0)]
+        .map(|(wavelength, level)| {
+            let frame = levels(&profile, |_, _| level);
+            Frame::new(&profile, wavelength, frame.levels).expect("frame")
+        })
+        .to_vec();
+    let frames: Vec<&Frame> = frames.iter().collect();
+    let see =
+        |share: f64| simulate_sequence(&frames, &Simulation::default(), share, &Progress::new()).expect("sequence");
+    let phase = |field: &Field| f64::from(field.samples[7].im.atan2(field.samples[7].re)).rem_euclid(TAU) / TAU * 256.0;
+    for (share, expected) in [(0.0, [64.0, 128.0, 0.0]), (0.25, [48.0, 112.0, 32.0])] {
+        let seen = see(share);
+        for ((field, frame), expected) in seen.iter().zip(&frames).zip(expected) {
+            assert_eq!(field.wavelength, frame.metadata.wavelength);
+            let miss = (phase(field) - expected + 128.0).rem_euclid(256.0) - 128.0;
+            assert!(miss.abs() < 1e-3, "{share}: {} instead of {expected}", phase(field));
+        }
+    }
+    assert!(simulate_sequence(&frames, &Simulation::default(), 1.5, &Progress::new()).is_err());
 }

@@ -149,9 +149,9 @@ fn curves_that_differ_over_the_panel_are_found_by_region() {
     let folder = tempfile::tempdir().expect("folder");
     let f = folder.path();
     fs::write(f.join("panel.toml"), PROFILE).expect("profile");
-    // Ranges from 1.9π to 2.4π over three by two regions.
+    // Ranges from 2π to 2.25π over three by two regions, each bent in its own way.
     let curves: Vec<Curve> =
-        (0..6).map(|k| Curve::Table { phase: hidden((1.9 + 0.1 * f64::from(k)) * PI, 40 + k as u64) }).collect();
+        (0..6).map(|k| Curve::Table { phase: hidden((2.0 + 0.05 * f64::from(k)) * PI, 40 + k as u64) }).collect();
     let truth = Curve::Regional { columns: 3, rows: 2, curves: curves.clone() };
     done(
         f,
