@@ -1,11 +1,18 @@
-//! `calibrate` closes its loop on the simulated panel: what was hidden in it is found by the command line.
+//! From field to panel and back: `calibrate` finds what is hidden in the simulated panel, sub-frames average speckle, and
+//! placement in frequency keeps the picture where it was.
 
+use glam::{DVec2, DVec3};
 use holodrive::encode::{EncodeSettings, Encoding, encode};
 use holodrive::field::{Complex32, Complex64, Field, npy};
+use holodrive::hologram::HologramSettings;
 use holodrive::panel::calibration::zernike;
 use holodrive::panel::{Curve, Faults, Frame, PanelProfile, Response, Simulation, Wavefront, simulate, wavefront};
+use holodrive::pipeline::{self, SubFrames};
+use holodrive::points::{Channel, PointCloud, PointSource};
 use holodrive::progress::Progress;
 use holodrive::random::Random;
+use holodrive::reconstruction::metrics::speckle_contrast;
+use holodrive::reconstruction::{self, Picture, View};
 use std::f64::consts::{PI, TAU};
 use std::fs;
 use std::path::Path;
@@ -348,4 +355,193 @@ fn bad_calibrations_end_in_one_line() {
     refused(f, &["calibrate", "check", "--panel", "green.toml", "--wavelength", "1064nm", "-o", "s"], "1.064um");
     write("corrected.toml", &format!("{PROFILE}[[correction]]\nfile = \"small.npy\"\nwavelength = \"532nm\"\n"));
     refused(f, &["calibrate", "check", "--panel", "corrected.toml", "-o", "s"], "5×4");
+}
+
+#[test]
+fn speckle_of_sub_frames_falls_with_the_root_of_their_number() {
+    let text = PROFILE.replace("width = 96", "width = 160").replace("64", "120").replace("0.93", "1.0");
+    let profile = PanelProfile::parse(&text, Path::new("t.toml")).expect("profile");
+    let grid = profile.grid().expect("grid");
+    let z = -0.03;
+    // A square of points closer than the panel resolves at that depth (λz/D = 12 µm), all as bright.
+    let points = (0..50 * 50)
+        .map(|i| {
+            let at = |k: usize| (k as f64 - 24.5) * 8e-6;
+            PointSource { position: DVec3::new(at(i % 50), at(i / 50), z), amplitude: 1.0, phase: 0.0 }
+        })
+        .collect();
+    let cloud = PointCloud { points, rgb: None };
+    let progress = Progress::new();
+    let seen = |count: usize, kind: SubFrames| -> f64 {
+        let pictures: Vec<Picture> = (0..count)
+            .map(|index| {
+                let share = (index, count, kind, 7);
+                let settings = HologramSettings::default();
+                let field =
+                    pipeline::sub_field(&cloud, Channel::Luminance, share, &grid, WAVELENGTH, &settings, &progress)
+                        .expect("field")
+                        .field;
+                let settings = EncodeSettings::new(Encoding::named("double-phase").expect("name"));
+                let frame = encode(&field, &profile, &settings, &progress).expect("encode").frame;
+                let (light, view) =
+                    pipeline::simulated_light(&frame, &Simulation::default(), &progress).expect("light");
+                let (window, values) =
+                    reconstruction::intensity(&light, &View::Plane { z }, DVec2::splat(0.15e-3), &view, &progress)
+                        .expect("picture");
+                Picture { width: window.width, height: window.height, values }
+            })
+            .collect();
+        speckle_contrast(&Picture::mean(&pictures).expect("pictures").values)
+    };
+    let one = seen(1, SubFrames::Phases);
+    assert!((0.75..1.15).contains(&one), "one frame of random phases has full speckle: {one}");
+    for count in [4, 16] {
+        let contrast = seen(count, SubFrames::Phases);
+        println!("{count} sub-frames: contrast {contrast:.3}, one {one:.3}");
+        // Some six hundred speckles in the window: the contrast scatters by a few per cent.
+        assert!((contrast * (count as f64).sqrt() / one - 1.0).abs() < 0.2, "{count}: {contrast} of {one}");
+    }
+    let sparse = seen(16, SubFrames::Sparse);
+    println!("16 sparse sub-frames: contrast {sparse:.3}");
+    assert!(sparse < 0.6 * one, "{sparse} {one}");
+}
+
+#[test]
+fn pictures_at_depths_blazes_lenses_and_views() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    fs::write(f.join("panel.toml"), PROFILE.replace("width = 96", "width = 128").replace("64", "96")).expect("profile");
+    let gray = |of: fn(u32, u32) -> u8| image::GrayImage::from_fn(64, 48, |x, y| image::Luma([of(x, y)]));
+    gray(|x, y| 60 + (2 * x + y) as u8).save(f.join("rgb.png")).expect("save");
+    gray(|x, _| [255, 128, 0][(3 * x / 64) as usize]).save(f.join("depth.png")).expect("save");
+    for method in ["weighted", "plane-gradient", "gerchberg-saxton", "double-constraint"] {
+        let report = done(
+            f,
+            &[
+                "encode",
+                "rgb.png+depth.png",
+                "--panel",
+                "panel.toml",
+                "--method",
+                method,
+                "--depths",
+                "5mm,6mm,7mm",
+                "--iterations",
+                "60",
+                "-o",
+                "planes.png",
+            ],
+        );
+        let numbers = |key: &str| -> Vec<f64> {
+            report[key].as_array().expect(key).iter().map(|v| v.as_f64().expect("number")).collect()
+        };
+        println!("{method}: {:.1?} dB", numbers("psnr"));
+        assert!(numbers("psnr").len() == 3 && numbers("psnr").iter().all(|p| *p > 15.0), "{method}: {report}");
+        assert_eq!(numbers("depths"), [-0.005, -0.006, -0.007]);
+        assert!(numbers("history").windows(2).all(|pair| pair[1] <= pair[0]), "{method}: an iteration made it worse");
+        let (frame, _) = Frame::read(&f.join("planes.png"), None, None).expect("frame");
+        assert_eq!(frame.metadata.origin.depth, Some([-0.005, -0.007]));
+    }
+    done(f, &["reconstruct", "planes.png", "--distance", "6mm", "-o", "seen.png"]);
+
+    // A field, sent aside and through a lens of the pattern's own.
+    let cloud = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0.0001 0 -0.01\n";
+    fs::write(f.join("p.ply"), cloud).expect("write");
+    done(f, &["compute", "p.ply", "--panel", "panel.toml", "-o", "field.npy"]);
+    let orders = |flags: &[&str]| {
+        done(f, &[&["encode", "field.npy", "--panel", "panel.toml", "-o", "frame.png"][..], flags].concat());
+        done(f, &["reconstruct", "frame.png", "--distance", "10mm", "--size", "40x30", "-o", "seen.png"])["orders"]
+            .clone()
+    };
+    let straight = orders(&[]);
+    let aside = orders(&["--blaze", "1deg,1deg"]);
+    println!("straight {straight}, aside {aside}");
+    // Straight, the dead space's light lies in the object's window; aside, only beyond it.
+    assert!(aside["zero"].as_f64().expect("share") > 1e-3);
+    orders(&["--blaze", "1deg,1deg", "--lens", "300mm"]);
+    orders(&["--band-stop", "0.1deg"]);
+    orders(&["--method", "gradient", "--iterations", "20", "--blaze", "1deg,1deg"]);
+    orders(&["--method", "error-diffusion", "--lens", "300mm"]);
+    // Where the object stands is where it was meant to, whatever the placement: the brightest cell of the picture.
+    let brightest = |flags: &[&str]| {
+        orders(flags);
+        done(
+            f,
+            &["reconstruct", "frame.png", "--distance", "10mm", "--half", "0.3mm", "--size", "30x30", "-o", "seen.npy"],
+        );
+        let seen = npy::read_real(&f.join("seen.npy")).expect("picture").values;
+        (0..seen.len()).max_by(|&a, &b| seen[a].total_cmp(&seen[b])).expect("cells")
+    };
+    let plain = brightest(&[]);
+    assert_eq!(plain, 14 * 30 + 20, "0.1 mm to the right of the middle, cells of 20 µm");
+    for flags in [&["--blaze", "1deg,-1deg"][..], &["--lens", "200mm"], &["--lens", "200mm", "--blaze", "0.9deg"]] {
+        let found = brightest(flags);
+        assert!(found.abs_diff(plain) <= 1 || found.abs_diff(plain).abs_diff(30) <= 1, "{flags:?}: {found} {plain}");
+    }
+
+    let views = [
+        "reconstruct",
+        "field.npy",
+        "--eye",
+        "0mm,0mm,100mm",
+        "--focus=-10mm",
+        "--pupil",
+        "1mm",
+        "--size",
+        "40x30",
+        "--views",
+        "3x2",
+        "--eye-box",
+        "2mm,1mm",
+        "-o",
+        "eye.png",
+    ];
+    assert_eq!(done(f, &views)["views"].as_array().expect("views").len(), 6);
+    assert!(f.join("eye-0-0.png").is_file() && f.join("eye-2-1.png").is_file());
+    let shown = done(f, &["show", "p.ply", "--panel", "panel.toml", "--subframes", "3", "-o", "out"]);
+    assert_eq!(shown["subframes"], 3);
+    assert!(f.join("out/frame-002.png").is_file() && f.join("out/reconstruction-near.png").is_file());
+
+    for (arguments, word) in [
+        (
+            &[
+                "encode",
+                "rgb.png",
+                "--panel",
+                "panel.toml",
+                "--method",
+                "double-phase",
+                "--depths",
+                "5mm",
+                "-o",
+                "x.png",
+            ][..],
+            "field",
+        ),
+        (&["encode", "rgb.png", "--panel", "panel.toml", "-o", "x.png"], "--depths"),
+        (&["encode", "rgb.png", "--panel", "panel.toml", "--depths", "5mm,6mm", "-o", "x.png"], "one"),
+        (&["encode", "rgb.png", "--panel", "panel.toml", "--depths", "5", "-o", "x.png"], "unit"),
+        (&["encode", "rgb.png", "--panel", "panel.toml", "--depths", "5mm", "--window", "2", "-o", "x.png"], "window"),
+        (&["encode", "field.npy", "--panel", "panel.toml", "--depths", "5mm", "-o", "x.png"], "depths"),
+        (&["encode", "field.npy", "--panel", "panel.toml", "--iterations", "5", "-o", "x.png"], "iterations"),
+        (&["encode", "field.npy", "--panel", "panel.toml", "--blaze", "95deg", "-o", "x.png"], "blaze"),
+        (&["encode", "field.npy", "--panel", "panel.toml", "--blaze", "5deg", "-o", "x.png"], "limit"),
+        (&["encode", "field.npy", "--panel", "panel.toml", "--lens", "0mm", "-o", "x.png"], "lens"),
+        (&["encode", "field.npy", "--panel", "panel.toml", "--lens", "1mm", "-o", "x.png"], "limit"),
+        (&["encode", "field.npy", "--panel", "panel.toml", "--correction", "none.npy", "-o", "x.png"], "none.npy"),
+        (
+            &["encode", "field.npy", "--panel", "panel.toml", "--method", "lee", "--blaze", "1deg", "-o", "x.png"],
+            "reference",
+        ),
+        (
+            &["reconstruct", "field.npy", "--distance", "5mm", "--views", "3x2", "--eye-box", "2mm", "-o", "x.png"],
+            "--eye",
+        ),
+        (&["show", "field.npy", "--panel", "panel.toml", "--subframes", "3", "-o", "."], "sub-frames"),
+        (&["show", "p.ply", "--panel", "panel.toml", "--subframes", "0", "-o", "."], "subframes"),
+        (&["bench", "encodings", "--size", "8x8"], "size"),
+        (&["bench", "encodings", "--scene", "none.gltf"], "none.gltf"),
+    ] {
+        refused(f, arguments, word);
+    }
 }

@@ -6,7 +6,7 @@ use super::iterative::{
 };
 use super::{DoublePhase, EncodedPattern, Interlace, band, double_phase};
 use crate::error::{Error, Result};
-use crate::field::{Complex32, Field, Grid};
+use crate::field::{Complex32, Field};
 use crate::panel::{EncodingRecord, Illumination, Modulation, PanelProfile, Pattern};
 use crate::progress::Progress;
 use crate::propagation::{Aperture, propagate};
@@ -68,7 +68,7 @@ pub enum PlaneStart {
         /// The seed.
         seed: u64,
     },
-    /// A lens that carries the panel's rectangle into three quarters of it at the middle depth: no speckle.
+    /// A lens that widens the panel's rectangle to 1.4 times its size at the middle depth: no speckle.
     Quadratic,
     /// Random, changing smoothly over 16 pixels.
     Smooth {
@@ -186,13 +186,6 @@ pub(super) fn of_planes(
         other => other,
     };
     let start = start(first, &depths, profile, wavelength);
-    let mut planes = planes;
-    if settings.method == PlaneMethod::DoubleConstraint {
-        let (grid, length) = (profile.grid()?, focal_length(&depths, profile, wavelength));
-        for plane in planes.iter_mut().filter(|plane| plane.phase.is_none()) {
-            plane.phase = Some(smooth_phases(&grid, plane.z, length, wavelength));
-        }
-    }
     let found = run(&Target::Amplitude(planes), settings, start, profile, wavelength, illumination, progress)?;
     let settings = PlaneEncoding { depths, ..settings.clone() };
     let record = record(settings.method.name(), &found, None, illumination, parameters(&settings));
@@ -208,23 +201,14 @@ fn start(start: PlaneStart, depths: &[f64], profile: &PanelProfile, wavelength: 
     }
 }
 
-/// Focal length of the lens that carries the panel's rectangle into three quarters of it at the middle depth: the wave's
-/// width at depth z is (1 + z/f) times that on the panel. On the panel itself any weak lens does.
+/// Focal length of a lens that widens the panel's rectangle to 1.4 times its size at the middle depth (the wave's width at
+/// depth z is 1 + z/f times that on the panel): smooth light all over the picture and beside it, where what is too much
+/// can go. On the panel itself any weak lens does.
 fn focal_length(depths: &[f64], profile: &PanelProfile, wavelength: f64) -> f64 {
     let middle = depths.iter().sum::<f64>() / depths.len().max(1) as f64;
-    let weak = profile.width.max(profile.height) as f64 * profile.pitch_x.max(profile.pitch_y).powi(2) / wavelength;
-    // A lens that the pixels cannot bend is none.
-    (-4.0 * middle).abs().max(weak) * if middle > 0.0 { -1.0 } else { 1.0 }
-}
-
-/// Phases [rad] of that lens' wave at depth z: smooth, and the same light at all depths.
-fn smooth_phases(grid: &Grid, z: f64, focal_length: f64, wavelength: f64) -> Vec<f32> {
-    let radius = focal_length + z;
-    let one = |i: usize| {
-        let (x, y) = (grid.x(i % grid.width), grid.y(i / grid.width));
-        (((x * x + y * y) / (2.0 * wavelength * radius)).rem_euclid(1.0) * std::f64::consts::TAU) as f32
-    };
-    (0..grid.len()).map(one).collect()
+    // Steeper than half a turn a pixel is no lens.
+    let least = profile.width.max(profile.height) as f64 * profile.pitch_x.max(profile.pitch_y).powi(2) / wavelength;
+    (2.5 * middle).abs().max(least) * if middle < 0.0 { -1.0 } else { 1.0 }
 }
 
 fn run(

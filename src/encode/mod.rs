@@ -185,7 +185,8 @@ impl EncodeSettings {
 /// [`Error::Parameter`] for angles of a right angle or more, or a focal length that is zero or not finite.
 pub fn blaze_and_lens(angles: [f64; 2], focal_length: Option<f64>, wavelength: f64) -> Result<Illumination> {
     let sines = angles.map(f64::sin);
-    if angles.iter().any(|a| !(a.abs() < std::f64::consts::FRAC_PI_2)) || sines[0].hypot(sines[1]) >= 1.0 {
+    let within = |a: &f64| a.abs() < std::f64::consts::FRAC_PI_2;
+    if !angles.iter().all(within) || sines[0].hypot(sines[1]) >= 1.0 {
         return Err(Error::parameter("blaze", format!("{angles:?} rad: no light runs in that direction")));
     }
     match focal_length {

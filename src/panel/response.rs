@@ -168,16 +168,6 @@ impl Curve {
         }
     }
 
-    /// The phases of each region's levels, for [`Curve::Regional`].
-    fn region_phases(&self, levels: usize, wavelength: f64) -> Option<((usize, usize), Vec<Vec<f64>>)> {
-        match self {
-            Self::Regional { columns, rows, curves } => {
-                Some(((*columns, *rows), curves.iter().map(|curve| curve.phases(levels, wavelength)).collect()))
-            }
-            _ => None,
-        }
-    }
-
     /// As [`Curve::resolve`], for each pixel of a panel of that size.
     pub(crate) fn resolve_pixels(
         &self,
@@ -188,12 +178,12 @@ impl Curve {
         sign: PhaseSign,
     ) -> PixelCurve {
         let mean = self.resolve(levels, wavelength, measured_at, sign);
-        let Some((regions, phases)) = self.region_phases(levels, wavelength) else {
+        let Self::Regional { columns, rows, curves } = self else {
             return PixelCurve::uniform(mean);
         };
         let factor = phase_factor(wavelength, measured_at, sign);
-        let phases = phases.into_iter().map(|p| p.into_iter().map(|p| p * factor).collect()).collect();
-        PixelCurve::regional(mean, regions, phases, size)
+        let phases = |curve: &Self| curve.phases(levels, wavelength).into_iter().map(|p| p * factor).collect();
+        PixelCurve::regional(mean, (*columns, *rows), curves.iter().map(phases).collect(), size)
     }
 
     /// The curve worked out level by level at a wavelength [m]; `measured_at` is where a phase curve was measured.

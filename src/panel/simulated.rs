@@ -165,11 +165,11 @@ fn check(frame: &Frame, grid: Grid, settings: &Simulation) -> Result<()> {
     if !(0.0..=1.0).contains(&faults.amplitude_coupling) || !(0.0..=1.0).contains(&faults.dead_space.unwrap_or(0.0)) {
         return Err(Error::parameter("amplitude_coupling, dead_space", "must be 0 … 1"));
     }
-    if let Some(residue) = &faults.residue {
-        if residue.levels.len() != grid.len() || !(0.0..=1.0).contains(&residue.share) {
-            let what = format!("{} levels and a share of {}", residue.levels.len(), residue.share);
-            return Err(Error::parameter("residue", what));
-        }
+    if let Some(residue) = &faults.residue
+        && (residue.levels.len() != grid.len() || !(0.0..=1.0).contains(&residue.share))
+    {
+        let what = format!("{} levels and a share of {}", residue.levels.len(), residue.share);
+        return Err(Error::parameter("residue", what));
     }
     if !faults.phase_scale.is_finite() {
         return Err(Error::parameter("phase_scale", "must be finite"));

@@ -69,7 +69,7 @@ pub fn cards(
             frame: shown(half_turn(grid), "half-turn")?,
             look_for: format!(
                 "image the panel with undiffracted light alone (a stop that lets only the zero order pass): of {FIELDS} \
-                 fields from {} to {} of a half turn the middle one, between two bars, is the darkest; if the field marked \
+                 fields from {:.1} to {:.1} of a half turn the middle one, between two bars, is the darkest; if the field marked \
                  by k steps to the right is, the curve's 2π level is {:.0} % too low for each step",
                 half_turn_factor(0),
                 half_turn_factor(FIELDS - 1),
@@ -152,13 +152,14 @@ fn letters(grid: Grid, wavelength: f64, distance: f64, progress: &Progress) -> R
     let mut points = Vec::new();
     let mut random = Random::new(1, 0);
     for (letter, left) in [(F, -11.0), (L, 3.0)] {
-        // Three points a stroke's cell along each way make a line.
+        // Points of a regular lattice would have their products on the same lattice: each is moved a little.
         for (row, line) in letter.iter().enumerate() {
             for (column, _) in line.char_indices().filter(|(_, c)| *c == '#') {
                 for sub in 0..4 {
                     let (du, dv) = (f64::from(sub % 2) * 0.5, f64::from(sub / 2) * 0.5);
-                    let x = (left + 2.0 * (column as f64 + du)) * step;
-                    let y = (6.0 - 2.0 * (row as f64 + dv)) * step;
+                    let mut astray = || 0.9 * (random.uniform() - 0.5);
+                    let x = (left + 2.0 * (column as f64 + du) + astray()) * step;
+                    let y = (6.0 - 2.0 * (row as f64 + dv) + astray()) * step;
                     let position = DVec3::new(x, y, distance);
                     points.push(PointSource { position, amplitude: 1.0, phase: random.phase() });
                 }
