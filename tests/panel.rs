@@ -436,7 +436,9 @@ fn pictures_at_depths_blazes_lenses_and_views() {
             report[key].as_array().expect(key).iter().map(|v| v.as_f64().expect("number")).collect()
         };
         println!("{method}: {:.1?} dB", numbers("psnr"));
-        assert!(numbers("psnr").len() == 3 && numbers("psnr").iter().all(|p| *p > 15.0), "{method}: {report}");
+        // Sixty iterations on a small panel; a second constraint costs what the others gain by choosing phases.
+        let least = if method == "double-constraint" { 12.0 } else { 25.0 };
+        assert!(numbers("psnr").len() == 3 && numbers("psnr").iter().all(|p| *p > least), "{method}: {report}");
         assert_eq!(numbers("depths"), [-0.005, -0.006, -0.007]);
         assert!(numbers("history").windows(2).all(|pair| pair[1] <= pair[0]), "{method}: an iteration made it worse");
         let (frame, _) = Frame::read(&f.join("planes.png"), None, None).expect("frame");

@@ -27,10 +27,10 @@ pub(crate) enum BenchCommand {
 #[derive(Debug, Args)]
 pub(crate) struct EncodingsArgs {
     /// Pixels of the panel (of 8 µm).
-    #[arg(long, default_value = "384x288", value_parser = super::args::size, value_name = "WxH")]
+    #[arg(long, default_value = "256x192", value_parser = super::args::size, value_name = "WxH")]
     size: (usize, usize),
     /// Iterations of the methods that iterate.
-    #[arg(long, default_value_t = 300, value_name = "N")]
+    #[arg(long, default_value_t = 200, value_name = "N")]
     iterations: usize,
     /// First phases of the methods with depths.
     #[arg(long, value_enum, default_value_t = StartArg::Random, value_name = "PHASES")]

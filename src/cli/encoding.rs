@@ -195,8 +195,8 @@ fn encode_picture(args: &EncodeArgs, panel: &Panel, progress: &Progress, report:
     };
     let first = match args.encoding.start {
         Some(typed) => start(typed),
-        // A gradient finds its way out of speckle; projections do not.
-        None if method.method == PlaneMethod::DoubleConstraint => PlaneStart::Quadratic,
+        // Random phases bring light from all of the panel to all of the picture; a double constraint asks for smooth ones.
+        None if method.method == PlaneMethod::DoubleConstraint => PlaneStart::Field,
         None => PlaneStart::Random { seed: 1 },
     };
     let own = PlaneEncoding { start: first, depths: depths.clone(), ..given.clone() };

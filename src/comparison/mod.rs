@@ -202,7 +202,8 @@ fn by_planes(
     progress: &Progress,
 ) -> Result<Frame> {
     let start = match settings.method {
-        PlaneMethod::DoubleConstraint => PlaneStart::Quadratic,
+        // Whose phases are asked for as well: it starts from those.
+        PlaneMethod::DoubleConstraint => PlaneStart::Field,
         _ => effort.start,
     };
     let settings = PlaneEncoding { iterations: effort.iterations, start, ..settings };

@@ -59,7 +59,8 @@ impl PlaneMethod {
 /// The phases from which amplitudes on planes are sought.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlaneStart {
-    /// The field's own: a warm start. For pictures as [`PlaneStart::Quadratic`].
+    /// The field's own: a warm start. For pictures the phase of the field that has their amplitudes, and one phase on each
+    /// plane.
     Field,
     /// The same everywhere.
     Constant,
@@ -95,9 +96,9 @@ pub struct PlaneEncoding {
 }
 
 impl PlaneEncoding {
-    /// A method with 100 iterations; the start is the field's phase, for double constraints a lens.
+    /// A method with 100 iterations that starts from the field's phase.
     pub fn new(method: PlaneMethod) -> Self {
-        let start = if method == PlaneMethod::DoubleConstraint { PlaneStart::Quadratic } else { PlaneStart::Field };
+        let start = PlaneStart::Field;
         Self { method, depths: Vec::new(), iterations: 100, efficiency: 0.5, start, padding: Padding::Dark }
     }
 }
@@ -181,11 +182,21 @@ pub(super) fn of_planes(
     progress: &Progress,
 ) -> Result<(Solution, EncodingRecord)> {
     let depths: Vec<f64> = planes.iter().map(|plane| plane.z).collect();
-    let first = match settings.start {
-        PlaneStart::Field => PlaneStart::Quadratic,
-        other => other,
+    let start = match settings.start {
+        PlaneStart::Field => {
+            let grid = profile.grid()?;
+            let mut sum = vec![Complex32::new(0.0, 0.0); grid.len()];
+            for plane in &planes {
+                let light =
+                    |(i, &a): (usize, &f32)| Complex32::from_polar(a, plane.phase.as_ref().map_or(0.0, |p| p[i]));
+                let field = Field::new(grid, wavelength, plane.amplitude.iter().enumerate().map(light).collect())?;
+                let back = propagate(&field, -plane.z, progress)?;
+                sum.iter_mut().zip(&back.samples).for_each(|(sum, u)| *sum += u);
+            }
+            Start::Phase(sum.iter().map(|u| u.im.atan2(u.re)).collect())
+        }
+        other => start(other, &depths, profile, wavelength),
     };
-    let start = start(first, &depths, profile, wavelength);
     let found = run(&Target::Amplitude(planes), settings, start, profile, wavelength, illumination, progress)?;
     let settings = PlaneEncoding { depths, ..settings.clone() };
     let record = record(settings.method.name(), &found, None, illumination, parameters(&settings));
@@ -227,7 +238,10 @@ fn run(
     }
     let projections = GerchbergSaxton {
         iterations,
-        weighting: if settings.method == PlaneMethod::Weighted { 0.1 } else { 0.0 },
+        weighting: match settings.method {
+            PlaneMethod::Weighted | PlaneMethod::DoubleConstraint => 0.1,
+            _ => 0.0,
+        },
         constraint: match settings.method {
             PlaneMethod::DoubleConstraint => Constraint::AmplitudeAndPhase,
             _ => Constraint::Amplitude,
