@@ -222,7 +222,7 @@ fn reports_are_json_and_help_has_examples() {
     assert!(report["points"].as_u64().expect("points") > 20);
     assert_eq!(report["command"], "points");
     assert!(f.join("p.ply").is_file() && f.join("t.npy").is_file());
-    for command in ["points", "compute", "propagate", "encode", "reconstruct", "show"] {
+    for command in ["points", "compute", "propagate", "encode", "reconstruct", "show", "calibrate", "bench"] {
         let help = holodrive(f, &[command, "--help"]);
         let text = String::from_utf8_lossy(&help.stdout).to_string();
         assert!(help.status.success() && text.contains(&format!("holodrive {command} ")), "{text}");

@@ -547,3 +547,23 @@ fn pictures_at_depths_blazes_lenses_and_views() {
         refused(f, arguments, word);
     }
 }
+
+#[test]
+fn the_table_and_the_rate_are_made_by_one_command_each() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    let only = ["--only", "double-phase", "--only", "weighted"];
+    let report =
+        done(f, &[&["bench", "encodings", "--size", "96x72", "--iterations", "3", "-o", "t.md"][..], &only].concat());
+    let rows = report["rows"].as_array().expect("rows");
+    assert_eq!(rows.len(), 6, "two encodings on three panels");
+    for row in rows {
+        for key in ["psnr", "ssim", "efficiency", "speckle", "seconds"] {
+            assert!(row[key].as_f64().is_some_and(f64::is_finite), "{key} of {row}");
+        }
+    }
+    assert_eq!(fs::read_to_string(f.join("t.md")).expect("table").lines().filter(|l| l.starts_with("| ")).count(), 3);
+    let rate = done(f, &["bench", "iterations", "--size", "64x48", "--planes", "2", "--iterations", "3"]);
+    assert!(rate["iterations_per_second"].as_f64().is_some_and(|rate| rate > 0.0), "{rate}");
+    assert!(rate["pairs_per_plane"].as_f64().is_some_and(f64::is_finite));
+}

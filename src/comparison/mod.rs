@@ -311,26 +311,46 @@ fn measure(frame: &Frame, planes: &[TargetPlane], faults: &Faults, progress: &Pr
     })
 }
 
-/// Rows as a table in Markdown.
+/// Rows as tables in Markdown, one for each picture: a line for each encoding, a column for each panel.
+///
+/// A cell holds PSNR (of the worst plane, where there are several) [dB], SSIM, efficiency [%] and speckle contrast; the
+/// last column holds the time of the encoding on the first panel [s].
 pub fn markdown(rows: &[Row]) -> String {
-    let mut out = String::from(
-        "| picture | panel | encoding | PSNR dB | worst plane dB | SSIM | efficiency % | speckle | seconds |\n\
-         |---|---|---|---:|---:|---:|---:|---:|---:|\n",
-    );
-    for row in rows {
-        let worst = row.psnr_planes.iter().copied().fold(f64::INFINITY, f64::min);
-        out += &format!(
-            "| {} | {} | {} | {:.1} | {:.1} | {:.3} | {:.2} | {:.3} | {:.2} |\n",
-            row.picture,
-            row.panel,
-            row.encoding,
-            row.psnr,
-            worst,
-            row.ssim,
-            100.0 * row.efficiency,
-            row.speckle,
-            row.seconds
-        );
+    let unique = |of: &dyn Fn(&Row) -> String| {
+        let mut names: Vec<String> = Vec::new();
+        for name in rows.iter().map(of) {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
+    };
+    let panels = unique(&|row| row.panel.into());
+    let encodings = unique(&|row| row.encoding.into());
+    let mut out = String::new();
+    for picture in unique(&|row| row.picture.clone()) {
+        let rows: Vec<&Row> = rows.iter().filter(|row| row.picture == picture).collect();
+        let planes = rows.first().map_or(0, |row| row.psnr_planes.len());
+        let figures = if planes > 1 { "PSNR (worst plane)" } else { "PSNR" };
+        out += &format!("\n**{picture}**, {planes} plane{}: ", if planes == 1 { "" } else { "s" });
+        out += &format!("{figures} dB, SSIM, efficiency %, speckle contrast; simulated\n\n| encoding |");
+        out += &panels.iter().map(|panel| format!(" {panel} |")).collect::<String>();
+        out += " seconds |\n|---|";
+        out += &"---:|".repeat(panels.len() + 1);
+        out.push('\n');
+        for encoding in &encodings {
+            let of = |panel: &String| rows.iter().find(|row| row.panel == panel && row.encoding == encoding);
+            let cell = |row: &&Row| {
+                let worst = row.psnr_planes.iter().copied().fold(f64::INFINITY, f64::min);
+                let worst = if planes > 1 { format!(" ({worst:.1})") } else { String::new() };
+                let (share, speckle) = (100.0 * row.efficiency, row.speckle);
+                format!(" {:.1}{worst}, {:.2}, {share:.1}, {speckle:.2} |", row.psnr, row.ssim)
+            };
+            out += &format!("| {encoding} |");
+            out += &panels.iter().map(|panel| of(panel).map_or_else(|| " |".into(), cell)).collect::<String>();
+            let seconds = panels.first().and_then(of).map_or_else(String::new, |row| format!("{:.2}", row.seconds));
+            out += &format!(" {seconds} |\n");
+        }
     }
     out
 }

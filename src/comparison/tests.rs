@@ -53,3 +53,28 @@ fn three_planes_pass_their_targets_on_an_eight_bit_panel() {
         assert!(found.psnr_planes.len() == 3 && found.psnr_planes.iter().all(|p| *p > 30.0), "{found:?}");
     }
 }
+
+#[test]
+fn tables_have_a_line_for_each_encoding_and_a_column_for_each_panel() {
+    let row = |panel, encoding, psnr_planes: Vec<f64>| Row {
+        picture: "room".into(),
+        panel,
+        encoding,
+        psnr: 30.04,
+        psnr_planes,
+        ssim: 0.876,
+        efficiency: 0.1234,
+        speckle: 0.055,
+        seconds: 1.5,
+    };
+    let rows = [
+        row("ideal", "lee", vec![31.0, 29.0]),
+        row("8 bit", "lee", vec![31.0, 28.0]),
+        row("ideal", "kinoform", vec![1.0, 2.0]),
+    ];
+    let table = markdown(&rows);
+    let lines: Vec<&str> = table.lines().filter(|line| line.starts_with('|')).collect();
+    assert_eq!(lines[0], "| encoding | ideal | 8 bit | seconds |");
+    assert_eq!(lines[2], "| lee | 30.0 (29.0), 0.88, 12.3, 0.06 | 30.0 (28.0), 0.88, 12.3, 0.06 | 1.50 |");
+    assert_eq!(lines[3], "| kinoform | 30.0 (1.0), 0.88, 12.3, 0.06 | | 1.50 |");
+}
