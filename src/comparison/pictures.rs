@@ -57,7 +57,7 @@ pub fn flat_picture(profile: &PanelProfile) -> DepthPicture {
     DepthPicture::flat(width, height, (0..width * height).map(one).collect(), depth(profile, 0, 1))
 }
 
-/// A scene's traced picture, sorted by depth into `planes` planes of equal numbers of pixels.
+/// A scene's traced picture, sorted by depth into `planes` slices of equal thickness.
 ///
 /// # Errors
 /// As [`light`].
@@ -75,11 +75,10 @@ pub fn scene_picture(scene: &Path, profile: &PanelProfile, planes: usize, progre
         view.picture.iter().map(|rgb| Channel::Luminance.of(*rgb).clamp(0.0, white) / white).collect();
     let farthest = view.depths.iter().flatten().fold(0.0f64, |a, &z| a.min(z));
     let z: Vec<f64> = view.depths.iter().map(|z| z.unwrap_or(farthest)).collect();
-    // Borders between planes lie where equal numbers of pixels are.
-    let mut sorted = z.clone();
-    sorted.sort_by(|a, b| b.total_cmp(a));
-    let borders: Vec<f64> = (1..planes).map(|k| sorted[(k * sorted.len() / planes).min(sorted.len() - 1)]).collect();
-    let plane = z.iter().map(|z| borders.iter().filter(|border| z < *border).count()).collect();
+    // Slices of equal thickness: objects at a few depths come apart.
+    let nearest = z.iter().fold(f64::NEG_INFINITY, |a, &z| a.max(z));
+    let thickness = ((nearest - farthest) / planes.max(1) as f64).max(f64::MIN_POSITIVE);
+    let plane = z.iter().map(|z| (((nearest - z) / thickness) as usize).min(planes.saturating_sub(1))).collect();
     let depths = (0..planes).map(|k| depth(profile, k, planes)).collect();
     Ok(DepthPicture { width: view.width, height: view.height, light: values, plane, depths })
 }
