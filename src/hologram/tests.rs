@@ -277,6 +277,60 @@ fn gpu_equals_the_oracle() {
 }
 
 #[test]
+fn planes_on_the_gpu_keep_the_error_that_they_state() {
+    let Some(adapter) = adapter() else { return };
+    let set = InstructionSet::detect();
+    let grid = panel();
+    let mut ranks = Vec::new();
+    for smooth in [false, true] {
+        for (name, points) in clouds(smooth) {
+            let exact = oracle(&points, &grid, WAVELENGTH, Cull::Soft).expect("oracle");
+            for error in [5e-3, 1e-3] {
+                let got = field(&points, &grid, &settings(Method::GpuPlanes, error, set));
+                let (found, report) = (relative_error(&got.field.samples, &exact.samples), got.report);
+                println!(
+                    "{adapter} {name} {error:.0e}: {found:.2e}, bound {:.2e}, {}",
+                    report.error_bound, report.reason
+                );
+                let kept = found < error && found < report.error_bound && report.error_bound <= error;
+                assert!(kept, "{name} {error:.0e}: {found:.2e}, bound {:.2e}", report.error_bound);
+                ranks.push(report.reason.split("rank ").nth(1).and_then(|rank| rank[..1].parse::<u32>().ok()));
+            }
+        }
+    }
+    assert!(ranks.contains(&Some(1)) && ranks.contains(&Some(2)), "{ranks:?}");
+    let points = &clouds(false)[0].1;
+    let hard = HologramSettings { cull: Cull::Hard, ..settings(Method::GpuPlanes, 1e-3, set) };
+    assert!(matches!(plan(points, &grid, WAVELENGTH, &hard), Err(Error::Parameter { .. })));
+}
+
+#[test]
+fn planes_on_the_gpu_of_every_rank_and_of_crowds_equal_those_of_the_cpu() {
+    let Some(adapter) = adapter() else { return };
+    // Square pixels: one table for both axes. A crowd that one tile takes in several dispatches.
+    let grid = Grid::new(301, 187, 8e-6, 8e-6).expect("grid").centered_at([-0.2e-3, 0.1e-3]);
+    let mut points = cloud(3_000, [0.0; 2], [3e-3, 2e-3], [-0.03, 0.01], false);
+    points.extend(cloud(2_500, [0.1e-3, 0.2e-3], [1e-4, 1e-4], [-0.011, -0.010], true));
+    let optics = Optics::new(&grid, WAVELENGTH).expect("optics");
+    let sources = sources(&points).expect("sources");
+    let cloud = planes::Cloud::new(&optics, &grid, &sources);
+    let progress = Progress::new();
+    for (planes, rank) in [(3, 1), (2, 2), (1, 3), (1, 4)] {
+        let parameters = planes::Parameters { planes, rank, tail: 14.0, table: planes::Fineness::Fine };
+        let set = InstructionSet::detect();
+        let exact = planes::field(&grid, &optics, &cloud, &parameters, set, &progress).expect("cpu");
+        let got = gpu_planes(&grid, &optics, &cloud, &parameters, &progress).expect("gpu");
+        let wide: Vec<_> =
+            exact.samples.iter().map(|u| crate::field::Complex64::new(u.re.into(), u.im.into())).collect();
+        let found = relative_error(&got.samples, &wide);
+        println!("{adapter}, {planes} planes, rank {rank}: {found:.2e}");
+        assert!(found < exact::GPU_ROUNDING, "{planes} planes, rank {rank}: {found:.2e}");
+        let again = gpu_planes(&grid, &optics, &cloud, &parameters, &progress).expect("gpu");
+        assert_eq!(got, again, "rank {rank}");
+    }
+}
+
+#[test]
 fn gpu_stops_when_asked_and_is_never_chosen_where_it_is_the_cpu() {
     let Some(adapter) = adapter() else { return };
     let grid = Grid::new(1920, 1080, 8e-6, 8e-6).expect("grid");
