@@ -40,13 +40,13 @@ fn is_outside(at: vec2<u32>, radix: u32) -> bool {
 }
 
 // Sample `n` of a butterfly, times its root of unity.
-fn read(at: vec2<u32>, n: u32, radix: u32) -> vec2<f32> {
+fn sample(at: vec2<u32>, n: u32, radix: u32) -> vec2<f32> {
     let v = before[(at.x + n * (job.length / radix)) * job.stride + at.y * job.pitch];
     let root = roots[n * (at.x % job.span) * (job.length / (job.span * radix))];
     return times(v, vec2(root.x, root.y * job.sign));
 }
 
-fn write(at: vec2<u32>, n: u32, radix: u32, v: vec2<f32>) {
+fn store(at: vec2<u32>, n: u32, radix: u32, v: vec2<f32>) {
     let k = at.x % job.span;
     after[((at.x - k) * radix + k + n * job.span) * job.stride + at.y * job.pitch] = v;
 }
@@ -57,10 +57,10 @@ fn radix2(@builtin(global_invocation_id) id: vec3<u32>) {
     if (is_outside(at, 2u)) {
         return;
     }
-    let a = read(at, 0u, 2u);
-    let b = read(at, 1u, 2u);
-    write(at, 0u, 2u, a + b);
-    write(at, 1u, 2u, a - b);
+    let a = sample(at, 0u, 2u);
+    let b = sample(at, 1u, 2u);
+    store(at, 0u, 2u, a + b);
+    store(at, 1u, 2u, a - b);
 }
 
 @compute @workgroup_size(64)
@@ -69,14 +69,14 @@ fn radix3(@builtin(global_invocation_id) id: vec3<u32>) {
     if (is_outside(at, 3u)) {
         return;
     }
-    let a = read(at, 0u, 3u);
-    let b = read(at, 1u, 3u);
-    let c = read(at, 2u, 3u);
+    let a = sample(at, 0u, 3u);
+    let b = sample(at, 1u, 3u);
+    let c = sample(at, 2u, 3u);
     let even = a - 0.5 * (b + c);
     let odd = turned(b - c) * 0.8660254;
-    write(at, 0u, 3u, a + (b + c));
-    write(at, 1u, 3u, even + odd);
-    write(at, 2u, 3u, even - odd);
+    store(at, 0u, 3u, a + (b + c));
+    store(at, 1u, 3u, even + odd);
+    store(at, 2u, 3u, even - odd);
 }
 
 @compute @workgroup_size(64)
@@ -85,15 +85,15 @@ fn radix4(@builtin(global_invocation_id) id: vec3<u32>) {
     if (is_outside(at, 4u)) {
         return;
     }
-    let a = read(at, 0u, 4u);
-    let b = read(at, 1u, 4u);
-    let c = read(at, 2u, 4u);
-    let d = read(at, 3u, 4u);
+    let a = sample(at, 0u, 4u);
+    let b = sample(at, 1u, 4u);
+    let c = sample(at, 2u, 4u);
+    let d = sample(at, 3u, 4u);
     let odd = turned(b - d);
-    write(at, 0u, 4u, (a + c) + (b + d));
-    write(at, 1u, 4u, (a - c) + odd);
-    write(at, 2u, 4u, (a + c) - (b + d));
-    write(at, 3u, 4u, (a - c) - odd);
+    store(at, 0u, 4u, (a + c) + (b + d));
+    store(at, 1u, 4u, (a - c) + odd);
+    store(at, 2u, 4u, (a + c) - (b + d));
+    store(at, 3u, 4u, (a - c) - odd);
 }
 
 @compute @workgroup_size(64)
@@ -102,19 +102,19 @@ fn radix5(@builtin(global_invocation_id) id: vec3<u32>) {
     if (is_outside(at, 5u)) {
         return;
     }
-    let a = read(at, 0u, 5u);
-    let b = read(at, 1u, 5u);
-    let c = read(at, 2u, 5u);
-    let d = read(at, 3u, 5u);
-    let e = read(at, 4u, 5u);
+    let a = sample(at, 0u, 5u);
+    let b = sample(at, 1u, 5u);
+    let c = sample(at, 2u, 5u);
+    let d = sample(at, 3u, 5u);
+    let e = sample(at, 4u, 5u);
     // Cosines and sines of a fifth and of two fifths of a turn.
     let even1 = a + 0.30901699 * (b + e) - 0.80901699 * (c + d);
     let even2 = a - 0.80901699 * (b + e) + 0.30901699 * (c + d);
     let odd1 = turned(0.95105652 * (b - e) + 0.58778525 * (c - d));
     let odd2 = turned(0.58778525 * (b - e) - 0.95105652 * (c - d));
-    write(at, 0u, 5u, a + (b + e) + (c + d));
-    write(at, 1u, 5u, even1 + odd1);
-    write(at, 2u, 5u, even2 + odd2);
-    write(at, 3u, 5u, even2 - odd2);
-    write(at, 4u, 5u, even1 - odd1);
+    store(at, 0u, 5u, a + (b + e) + (c + d));
+    store(at, 1u, 5u, even1 + odd1);
+    store(at, 2u, 5u, even2 + odd2);
+    store(at, 3u, 5u, even2 - odd2);
+    store(at, 4u, 5u, even1 - odd1);
 }

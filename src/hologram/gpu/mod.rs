@@ -11,6 +11,8 @@
 //! Fields larger than a binding are computed in bands of rows; a dispatch is kept to some 20 ms, so that a stop is
 //! noticed and no driver's watchdog bites; bands are read back while the next one is computed. The order of the sums
 //! is fixed: the same bits on one adapter and driver.
+//!
+//! Recording planes have their own shaders: [`planes`].
 
 mod device;
 mod dispatch;

@@ -80,8 +80,8 @@ pub(crate) fn cost(optics: &Optics, grid: &Grid, cloud: &Cloud, parameters: &Par
     let count = cloud.sources.len();
     let chunk = count.min(STROKES);
     let own = size_of::<Source>() + size_of::<Dab>() + size_of::<[[u32; 2]; 2]>();
-    // Strokes, lists and tables stand on both sides.
-    let host = count * own + chunk * size_of::<Stroke>() + 4 * ENTRIES + 8 * grid.len();
+    // Strokes and lists stand on the host, wait there to be copied, and on the device; tables on both sides.
+    let host = count * own + 2 * (chunk * size_of::<Stroke>() + 4 * ENTRIES) + 8 * grid.len();
     let on_device = (parameters.rank as u64 + 2) * 8 * samples + (STROKES * size_of::<Stroke>() + 4 * ENTRIES) as u64;
     let bytes = on_device + host as u64 + 2 * tables.iter().sum::<u64>();
     let area: f64 =
@@ -399,7 +399,10 @@ pub(crate) fn field(
             device.wait(Some(submission))?;
         }
         engine.moments.iter().for_each(|moment| recorder.clear(&moment.plane, 0));
-        for chunk in chunks(&spans) {
+        for (part, chunk) in chunks(&spans).into_iter().enumerate() {
+            if part > 0 {
+                device.wait(None)?;
+            }
             let strokes: Vec<Stroke> = dabs[chunk.clone()].par_iter().map(|dab| Stroke::new(dab, tables, h)).collect();
             let lists = Lists::new(&spans[chunk], tiles, WORK[usize::from(device.software)]);
             engine.paint(&mut recorder, &strokes, &lists)?;
