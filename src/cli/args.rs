@@ -138,6 +138,8 @@ pub(crate) enum EngineArg {
     Planes,
     /// Vectorised sum on a graphics processor.
     Gpu,
+    /// Recording planes on a graphics processor.
+    GpuPlanes,
     /// The difference method, for comparison.
     Recurrence,
 }

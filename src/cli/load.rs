@@ -163,6 +163,7 @@ pub(super) fn hologram_settings(args: &HologramArgs, engine: Option<EngineArg>) 
             EngineArg::Tiles => Method::Tiles,
             EngineArg::Planes => Method::Planes,
             EngineArg::Gpu => Method::Gpu,
+            EngineArg::GpuPlanes => Method::GpuPlanes,
             EngineArg::Recurrence => Method::Recurrence,
         }),
         memory: args.memory,

@@ -22,8 +22,8 @@ const NEAREST_EDGE: f64 = 0.94;
 /// Rounding of phases and sums in f32 (relative L2, measured).
 const ROUNDING: f64 = 1e-5;
 
-/// Rounding of phases, and polynomials, in the shader (relative L2).
-const GPU_ROUNDING: f64 = 1e-4;
+/// Rounding of phases, and polynomials, in the shaders (relative L2).
+pub(super) const GPU_ROUNDING: f64 = 1e-4;
 
 /// What a build without the feature `gpu` says.
 #[cfg(not(feature = "gpu"))]

@@ -28,7 +28,7 @@ use crate::field::{Field, Grid};
 use crate::points::PointSource;
 use crate::progress::Progress;
 use definition::Optics;
-use exact::Division;
+use exact::{Division, GPU_ROUNDING};
 use planner::{Engine, ORACLE_ERROR};
 use sources::{Source, sources};
 use std::time::Instant;
@@ -46,6 +46,8 @@ pub enum Method {
     Planes,
     /// The sum of `tiles` on a graphics processor (feature `gpu`).
     Gpu,
+    /// The planes of `planes` on a graphics processor (feature `gpu`); [`Cull::Soft`] only.
+    GpuPlanes,
     /// Yoshikawa's difference method: for comparison, never chosen.
     Recurrence,
 }
@@ -59,6 +61,7 @@ impl Method {
             Self::Tiles => "tiles",
             Self::Planes => "planes",
             Self::Gpu => "gpu",
+            Self::GpuPlanes => "gpu-planes",
             Self::Recurrence => "recurrence",
         }
     }
@@ -181,6 +184,12 @@ pub fn compute(
             progress.check()?;
             (division.sum_on_gpu(grid, &optics, &sources, cull, progress)?, division.gpu_error())
         }
+        Engine::GpuPlanes(parameters) => {
+            let cloud = planes::Cloud::new(&optics, grid, &sources);
+            progress.check()?;
+            let field = gpu_planes(grid, &optics, &cloud, &parameters, progress)?;
+            (field, parameters.error(&optics, &cloud) + GPU_ROUNDING)
+        }
         Engine::Planes(parameters) => {
             let cloud = planes::Cloud::new(&optics, grid, &sources);
             progress.check()?;
@@ -199,6 +208,15 @@ pub fn compute(
         coverage,
     };
     Ok(Computed { field, report })
+}
+
+#[cfg(feature = "gpu")]
+use gpu::planes::field as gpu_planes;
+
+/// A build without the engine.
+#[cfg(not(feature = "gpu"))]
+fn gpu_planes(_: &Grid, _: &Optics, _: &planes::Cloud, _: &planes::Parameters, _: &Progress) -> Result<Field> {
+    Err(exact::no_gpu())
 }
 
 /// Computes the field in `passes` that are shown as they come: first a quarter to the power of (`passes` − 1) of the
@@ -264,7 +282,7 @@ impl Computed {
     }
 }
 
-/// Name of the graphics processor that [`Method::Gpu`] computes on.
+/// Name of the graphics processor that [`Method::Gpu`] and [`Method::GpuPlanes`] compute on.
 ///
 /// # Errors
 /// [`Error::Unsupported`] where there is none, or in a build without the feature `gpu`.

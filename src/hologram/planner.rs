@@ -5,6 +5,8 @@
 //! all of them are off by about the same factor.
 
 use super::definition::Optics;
+#[cfg(feature = "gpu")]
+use super::exact::GPU_ROUNDING;
 use super::exact::{DIRECT_ERROR, Division};
 use super::planes::{Cloud, Parameters};
 use super::sources::{Coverage, Source, sources};
@@ -22,10 +24,6 @@ pub(super) const ORACLE_ERROR: f64 = 1e-5;
 
 /// Time of the oracle for a point and a pixel [core-seconds]; points that are integrated take thousands of times that.
 const ORACLE_PAIR: f64 = 1e-7;
-
-/// Pairs a second and core of a software adapter: a wide guess, since it is never chosen for its speed.
-#[cfg(feature = "gpu")]
-const SOFTWARE_GPU: f64 = 2e8;
 
 /// Least predicted time on the CPU for which a graphics processor is looked for [s].
 const GPU_WORTH: f64 = 1.0;
@@ -46,6 +44,9 @@ pub(super) enum Engine {
         error: f64,
     },
     Planes(Parameters),
+    /// Planes on the graphics processor.
+    #[cfg_attr(not(feature = "gpu"), expect(dead_code))] // refused there before it is made
+    GpuPlanes(Parameters),
     /// The exact sum on the graphics processor, with the error that tiles are chosen for.
     #[cfg_attr(not(feature = "gpu"), expect(dead_code))] // refused there before it is made
     Gpu {
@@ -124,7 +125,7 @@ impl Job<'_> {
             Division::new(&self.optics, self.grid, self.sources, self.settings.cull, error, &Progress::new());
         let near = near::core_seconds(&self.optics, self.sources, &division.near);
         let far: usize = division.far.iter().map(Class::len).sum();
-        let seconds = gpu::seconds(pairs).unwrap_or(pairs / (SOFTWARE_GPU * threads));
+        let seconds = gpu::seconds(pairs).unwrap_or(pairs / gpu::SOFTWARE_RATE);
         Ok(Candidate {
             method: Method::Gpu,
             engine: Engine::Gpu { error },
@@ -137,6 +138,35 @@ impl Job<'_> {
     /// A build without the engine.
     #[cfg(not(feature = "gpu"))]
     fn gpu(&self, _: f64, _: f64, _: f64) -> Result<Candidate> {
+        Err(super::exact::no_gpu())
+    }
+
+    /// Planes on the graphics processor; their time is a guess.
+    #[cfg(feature = "gpu")]
+    fn gpu_planes(&self, threads: f64) -> Result<Candidate> {
+        let adapter = gpu::adapter()?;
+        if self.settings.cull != Cull::Soft {
+            return Err(refuse_planes(self.settings));
+        }
+        let cloud = Cloud::new(&self.optics, self.grid, self.sources);
+        // The CPU's model chooses planes and rank; the device's own memory is asked below.
+        let error = (self.settings.error - GPU_ROUNDING).max(0.0);
+        let chosen = Parameters::choose(&self.optics, self.grid, &cloud, error, u64::MAX)
+            .ok_or_else(|| refuse_planes(self.settings))?;
+        let cost = gpu::planes::cost(&self.optics, self.grid, &cloud, &chosen.parameters)?;
+        let Parameters { planes, rank, .. } = chosen.parameters;
+        Ok(Candidate {
+            method: Method::GpuPlanes,
+            engine: Engine::GpuPlanes(chosen.parameters),
+            core_seconds: cost.seconds * threads,
+            error: chosen.error + GPU_ROUNDING,
+            memory: cost.bytes,
+            words: format!("{planes} planes, rank {rank} on {adapter} (its time is a guess)"),
+        })
+    }
+    /// A build without the engine.
+    #[cfg(not(feature = "gpu"))]
+    fn gpu_planes(&self, _: f64) -> Result<Candidate> {
         Err(super::exact::no_gpu())
     }
 
@@ -176,7 +206,7 @@ const FIELD_PIXEL: f64 = 8e-9;
 /// Slowness against AVX-512, measured.
 fn set_factor(settings: &HologramSettings, method: Method) -> f64 {
     match (settings.instruction_set.unwrap_or_else(InstructionSet::detect), method) {
-        (InstructionSet::Avx512, _) | (_, Method::Oracle | Method::Gpu) => 1.0,
+        (InstructionSet::Avx512, _) | (_, Method::Oracle | Method::Gpu | Method::GpuPlanes) => 1.0,
         (InstructionSet::Avx2, _) => 1.3,
         (InstructionSet::Portable, Method::Direct | Method::Recurrence) => 5.5,
         (InstructionSet::Portable, Method::Tiles) => 9.5,
@@ -211,6 +241,7 @@ pub fn plan(points: &[PointSource], grid: &Grid, wavelength: f64, settings: &Hol
                 Method::Tiles => job.exact(method, error),
                 Method::Planes => job.planes().ok_or_else(|| refuse_planes(settings))?,
                 Method::Gpu => job.gpu(error, pairs, threads)?,
+                Method::GpuPlanes => job.gpu_planes(threads)?,
                 Method::Recurrence => job.recurrence(error, pairs),
             };
             let reason = format!("{} as asked for", candidate.words);
@@ -256,6 +287,7 @@ fn choose(job: &Job, error: f64, pairs: f64, threads: f64) -> Result<(Candidate,
     let quickest = candidates.iter().map(|c| c.core_seconds / threads).fold(f64::INFINITY, f64::min);
     if quickest > GPU_WORTH && has_hardware_gpu() {
         candidates.extend(job.gpu(error, pairs, threads).ok());
+        candidates.extend(job.gpu_planes(threads).ok());
     }
     candidates.sort_by(|a, b| a.core_seconds.total_cmp(&b.core_seconds));
     let others: Vec<String> =

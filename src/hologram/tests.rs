@@ -255,6 +255,7 @@ fn gpu_equals_the_oracle() {
     let Some(adapter) = adapter() else { return };
     let set = InstructionSet::detect();
     let grid = panel();
+    let mut ranks = Vec::new();
     for smooth in [false, true] {
         for (name, points) in clouds(smooth) {
             let exact = oracle(&points, &grid, WAVELENGTH, Cull::Soft).expect("oracle");
@@ -262,8 +263,17 @@ fn gpu_equals_the_oracle() {
             let found = relative_error(&got.field.samples, &exact.samples);
             println!("{adapter} {name} smooth={smooth}: {found:.2e}, bound {:.2e}", got.report.error_bound);
             assert!(found < 1e-3 && found < got.report.error_bound, "{name}: {found:.2e}");
+            for error in [5e-3, 1e-3] {
+                let got = field(&points, &grid, &settings(Method::GpuPlanes, error, set));
+                let (found, report) = (relative_error(&got.field.samples, &exact.samples), got.report);
+                let bound = report.error_bound;
+                println!("{name} smooth={smooth} {error:.0e}: {found:.2e}, bound {bound:.2e}, {}", report.reason);
+                assert!(found < bound && bound <= error, "{name} {error:.0e}: {found:.2e}, bound {bound:.2e}");
+                ranks.push(report.reason.split("rank ").nth(1).and_then(|rank| rank[..1].parse::<u32>().ok()));
+            }
         }
     }
+    assert!(ranks.contains(&Some(1)) && ranks.contains(&Some(2)), "{ranks:?}");
     // Several cells, wide angles (each pixel from its own path), and the other cuts.
     let wide = Grid::new(301, 275, 1e-6, 1.25e-6).expect("grid").centered_at([1e-3, 0.4e-3]);
     let points = cloud(20, [0.2e-3, 0.0], [3e-3, 3e-3], [-5e-3, -10e-3], false);
@@ -277,20 +287,72 @@ fn gpu_equals_the_oracle() {
 }
 
 #[test]
+fn planes_on_the_gpu_of_every_rank_and_of_crowds_equal_those_of_the_cpu() {
+    let Some(adapter) = adapter() else { return };
+    // Square pixels: one table for both axes. A crowd that one tile takes in several dispatches.
+    let grid = Grid::new(301, 187, 8e-6, 8e-6).expect("grid").centered_at([-0.2e-3, 0.1e-3]);
+    let mut points = cloud(3_000, [0.0; 2], [3e-3, 2e-3], [-0.03, 0.01], false);
+    points.extend(cloud(2_500, [0.1e-3, 0.2e-3], [1e-4, 1e-4], [-0.011, -0.010], true));
+    let optics = Optics::new(&grid, WAVELENGTH).expect("optics");
+    let sources = sources(&points).expect("sources");
+    let cloud = planes::Cloud::new(&optics, &grid, &sources);
+    let progress = Progress::new();
+    for (planes, rank) in [(3, 1), (2, 2), (1, 3), (1, 4)] {
+        let parameters = planes::Parameters { planes, rank, tail: 28.0, table: planes::Fineness::Fine };
+        let set = InstructionSet::detect();
+        let exact = planes::field(&grid, &optics, &cloud, &parameters, set, &progress).expect("cpu");
+        let got = gpu_planes(&grid, &optics, &cloud, &parameters, &progress).expect("gpu");
+        let wide: Vec<_> =
+            exact.samples.iter().map(|u| crate::field::Complex64::new(u.re.into(), u.im.into())).collect();
+        let found = relative_error(&got.samples, &wide);
+        println!("{adapter}, {planes} planes, rank {rank}: {found:.2e}");
+        assert!(found < exact::GPU_ROUNDING, "{planes} planes, rank {rank}: {found:.2e}");
+        let again = gpu_planes(&grid, &optics, &cloud, &parameters, &progress).expect("gpu");
+        assert_eq!(got, again, "rank {rank}");
+    }
+}
+
+#[test]
+fn planes_that_the_gpu_cannot_take_are_refused_with_the_numbers() {
+    if adapter().is_none() {
+        return;
+    }
+    let plan_of = |width: usize, cull: Cull, memory: u64, error: f64| {
+        let grid = Grid::new(width, width, 8e-6, 8e-6).expect("grid");
+        let points = cloud(20, [0.0; 2], [1e-3; 2], [-0.2, -0.25], false);
+        let settings = settings(Method::GpuPlanes, error, InstructionSet::detect());
+        plan(&points, &grid, WAVELENGTH, &HologramSettings { cull, memory, ..settings })
+    };
+    assert!(plan_of(256, Cull::Soft, 1 << 30, 1e-3).is_ok());
+    assert!(matches!(plan_of(256, Cull::Soft, 1 << 20, 1e-3), Err(Error::Memory { .. })));
+    // Beyond any adapter's binding of four gigabytes.
+    match plan_of(30_000, Cull::Soft, 1 << 50, 1e-3) {
+        Err(Error::Unsupported { what }) => assert!(what.contains(" MB in one binding"), "{what}"),
+        other => panic!("{other:?}"),
+    }
+    // Neither another cut nor an error below the shaders' rounding.
+    assert!(matches!(plan_of(256, Cull::Hard, 1 << 30, 1e-3), Err(Error::Parameter { .. })));
+    assert!(matches!(plan_of(256, Cull::Soft, 1 << 30, 5e-5), Err(Error::Parameter { .. })));
+}
+
+#[test]
 fn gpu_stops_when_asked_and_is_never_chosen_where_it_is_the_cpu() {
     let Some(adapter) = adapter() else { return };
     let grid = Grid::new(1920, 1080, 8e-6, 8e-6).expect("grid");
     let points = cloud(20_000, [0.0; 2], [0.012, 0.007], [-0.2, -0.25], false);
     let plan_of = |settings: &HologramSettings| plan(&points, &grid, WAVELENGTH, settings).expect("plan");
-    let gpu = plan_of(&settings(Method::Gpu, 1e-3, InstructionSet::detect()));
-    let delays = (0..3).map_while(|_| stopping_delay(&points, &grid, &gpu, Duration::from_millis(300)));
-    if let Some(best) = delays.min_by(f64::total_cmp) {
-        println!("{adapter}: stopped {:.1} ms later", best * 1e3);
-        assert!(best < 0.2, "{best} s");
+    for method in [Method::Gpu, Method::GpuPlanes] {
+        let gpu = plan_of(&settings(method, 1e-3, InstructionSet::detect()));
+        let delays = (0..3).map_while(|_| stopping_delay(&points, &grid, &gpu, Duration::from_millis(300)));
+        if let Some(best) = delays.min_by(f64::total_cmp) {
+            println!("{adapter}: {method:?} stopped {:.1} ms later", best * 1e3);
+            assert!(best < 0.2, "{method:?}: {best} s");
+        }
     }
     if adapter.contains("llvmpipe") {
         let settings = HologramSettings { cull: Cull::None, ..HologramSettings::default() };
-        assert_ne!(plan_of(&settings).method, Method::Gpu);
+        assert!(!matches!(plan_of(&settings).method, Method::Gpu | Method::GpuPlanes));
+        assert!(!matches!(plan_of(&HologramSettings::default()).method, Method::Gpu | Method::GpuPlanes));
     }
 }
 

@@ -238,6 +238,10 @@ fn gpu() {
     for error in [2e-3, 2e-4] {
         run(&format!("{name}, {n} points"), &points, &hd(), &settings(Some(Method::Gpu), error), &[&reference], 3);
     }
+    for error in [5e-3, 1e-3, 5e-4] {
+        let settings = settings(Some(Method::GpuPlanes), error);
+        run(&format!("{name}, {n} points"), &points, &hd(), &settings, &[&reference], 5);
+    }
 }
 
 fn main() {

@@ -11,9 +11,15 @@
 //! Fields larger than a binding are computed in bands of rows; a dispatch is kept to some 20 ms, so that a stop is
 //! noticed and no driver's watchdog bites; bands are read back while the next one is computed. The order of the sums
 //! is fixed: the same bits on one adapter and driver.
+//!
+//! Recording planes have their own shaders: [`planes`].
 
 mod device;
 mod dispatch;
+mod fft;
+pub(crate) mod planes;
+mod record;
+mod strokes;
 
 use super::Cull;
 use super::definition::Optics;
@@ -71,6 +77,9 @@ struct Job {
     height: u32,
     unused: u32,
 }
+
+/// Pairs a second of a software adapter: a wide guess, since it is never chosen for its speed.
+pub(crate) const SOFTWARE_RATE: f64 = 4e8;
 
 /// Name of the adapter, or why there is none.
 pub(crate) fn adapter() -> Result<&'static str> {
@@ -264,6 +273,21 @@ impl Set {
             pipeline: usize::from(shape.exact || shape.height < TILE_ROWS),
             edges,
             job,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    /// The adapter, or `None` where the machine has none and none is required; says so.
+    pub(super) fn device() -> Option<&'static super::Device> {
+        match super::device::device() {
+            Ok(device) => Some(device),
+            Err(why) => {
+                assert!(std::env::var_os("HOLODRIVE_REQUIRE_DISPLAY").is_none_or(|v| v != "1"), "{why}");
+                println!("not run: {why}");
+                None
+            }
         }
     }
 }

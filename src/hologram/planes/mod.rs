@@ -22,11 +22,15 @@ use super::sources::{Source, tilt};
 use crate::error::Result;
 use crate::field::{Complex32, Field, Grid, zeroed};
 use crate::progress::Progress;
-use paint::{Brush, Canvas, Dab, paint};
+use paint::{Brush, Canvas, paint};
 use rayon::prelude::*;
-use slabs::{Depths, Slabs};
-use spectrum::{Layout, Spectrum};
-use table::{Fineness, Table, mean_square};
+use slabs::Depths;
+use spectrum::Spectrum;
+
+pub(in crate::hologram) use paint::Dab;
+pub(in crate::hologram) use slabs::Slabs;
+pub(in crate::hologram) use spectrum::Layout;
+pub(in crate::hologram) use table::{Fineness, Table, mean_square};
 
 /// How the planes are laid.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +61,7 @@ pub(crate) struct Chosen {
 #[derive(Clone, Debug)]
 pub(crate) struct Cloud {
     /// The sources whose light meets the panel.
-    sources: Vec<Source>,
+    pub(in crate::hologram) sources: Vec<Source>,
     /// Light by signed distance ζ = −z: it runs from −ζ to the panel at 0 [m].
     depths: Depths,
     /// Lowest and highest panel column, and row.
@@ -100,7 +104,7 @@ impl Cloud {
 
 impl Parameters {
     /// Where the planes stand.
-    fn slabs(&self, optics: &Optics, cloud: &Cloud) -> Slabs {
+    pub(in crate::hologram) fn slabs(&self, optics: &Optics, cloud: &Cloud) -> Slabs {
         cloud.depths.slabs(self.planes, optics.wavelength)
     }
     /// Predicted relative L2 error of the field.
@@ -254,6 +258,18 @@ fn reach(optics: &Optics, axis: usize, distance: f64) -> f64 {
 
 /// The periodic grid: large enough that no point's light comes round onto the panel.
 fn layout(optics: &Optics, grid: &Grid, cloud: &Cloud, parameters: &Parameters, slabs: &Slabs) -> Layout {
+    layout_of(optics, grid, cloud, parameters, slabs, &[1, 7, 11])
+}
+
+/// That grid for transforms of 16·2^a·3^b·5^c times one of `others` samples.
+pub(in crate::hologram) fn layout_of(
+    optics: &Optics,
+    grid: &Grid,
+    cloud: &Cloud,
+    parameters: &Parameters,
+    slabs: &Slabs,
+    others: &[usize],
+) -> Layout {
     let h = slabs.half;
     let mut layout = Layout { size: [0; 2], painted: 0, origin: [0; 2] };
     for (axis, pixels) in [grid.width as f64, grid.height as f64].into_iter().enumerate() {
@@ -261,7 +277,7 @@ fn layout(optics: &Optics, grid: &Grid, cloud: &Cloud, parameters: &Parameters, 
         let [low, high] = cloud.places[axis];
         let painted = high - low + 2.0 * halo + 2.0;
         let size = pixels.max(cloud.period[axis] + parameters.tail);
-        layout.size[axis] = transform_size(size.max(painted).ceil() as usize);
+        layout.size[axis] = transform_size(size.max(painted).ceil() as usize, others);
         layout.origin[axis] = (low - halo).floor() as i64;
         if axis == 1 {
             layout.painted = (painted.ceil() as usize).min(layout.size[1]);
@@ -270,8 +286,8 @@ fn layout(optics: &Optics, grid: &Grid, cloud: &Cloud, parameters: &Parameters, 
     layout
 }
 
-/// The smallest 16·2^a·3^b·5^c, or 7 or 11 times one, that is not below `n`: lengths that the transforms are fast at.
-fn transform_size(n: usize) -> usize {
+/// The smallest 16·2^a·3^b·5^c, times one of `others`, that is not below `n`: lengths that the transforms are fast at.
+fn transform_size(n: usize, others: &[usize]) -> usize {
     (n.div_ceil(16)..)
         .find(|&m| {
             let mut rest = m;
@@ -280,9 +296,36 @@ fn transform_size(n: usize) -> usize {
                     rest /= prime;
                 }
             }
-            matches!(rest, 1 | 7 | 11)
+            others.contains(&rest)
         })
         .map_or(n, |m| 16 * m)
+}
+
+/// What the phase of a point goes with by its depth from its plane [cycles/m]: the kernels carry exp(i2πd(α − ᾱ)) of
+/// each axis, this is the rest of f_z.
+pub(in crate::hologram) fn carrier(optics: &Optics, tables: [&Table; 2]) -> f64 {
+    let lambda = optics.wavelength;
+    1.0 / lambda
+        + tables[0].mean
+        + tables[1].mean
+        + 0.25 * lambda.powi(3) * mean_square(optics, 0) * mean_square(optics, 1)
+}
+
+/// A source relative to the plane at the signed distance `middle` [m].
+pub(in crate::hologram) fn dab(
+    optics: &Optics,
+    grid: &Grid,
+    layout: &Layout,
+    carrier: f64,
+    s: &Source,
+    middle: f64,
+) -> Dab {
+    let d = s.sign * s.distance - middle;
+    let turns = d * carrier + s.turns + 0.25 * s.sign;
+    let (sin, cos) = ((turns - turns.round()) * std::f64::consts::TAU).sin_cos();
+    let a = s.amplitude * optics.wavelength;
+    let at = [grid.column(s.x) - layout.origin[0] as f64, grid.row(s.y) - layout.origin[1] as f64];
+    Dab { at, d, factor: [(a * cos) as f32, (a * sin) as f32] }
 }
 
 /// The cloud's field on the panel.
@@ -308,20 +351,7 @@ pub(crate) fn field(
     let second = (!same).then(|| table(1));
     let tables: [&Table; 2] = [&first, second.as_deref().unwrap_or(&first)];
     progress.check()?;
-    let lambda = optics.wavelength;
-    // The kernels carry exp(i2πd(α − ᾱ)) of each axis: the rest of d·f_z is the point's phase.
-    let carrier = 1.0 / lambda
-        + tables[0].mean
-        + tables[1].mean
-        + 0.25 * lambda.powi(3) * mean_square(optics, 0) * mean_square(optics, 1);
-    let dab = |s: &Source, middle: f64| {
-        let d = s.sign * s.distance - middle;
-        let turns = d * carrier + s.turns + 0.25 * s.sign;
-        let (sin, cos) = ((turns - turns.round()) * std::f64::consts::TAU).sin_cos();
-        let a = s.amplitude * lambda;
-        let at = [grid.column(s.x) - layout.origin[0] as f64, grid.row(s.y) - layout.origin[1] as f64];
-        Dab { at, d, factor: [(a * cos) as f32, (a * sin) as f32] }
-    };
+    let carrier = carrier(optics, tables);
     let slope = [0, 1].map(|axis| optics.cone(axis, 1.0) / optics.pitch[axis]);
     let bin = paint::bin(tables.map(|table| table.half), parameters.rank);
     let brush = Brush { tables, slope, tail: parameters.tail, rank: parameters.rank, depth: h, bin };
@@ -332,7 +362,8 @@ pub(crate) fn field(
     for k in 0..slabs.depths.len() {
         let middle = slabs.plane(k);
         let is_here = |s: &&Source| slabs.index(s.sign * s.distance) == k;
-        let dabs: Vec<Dab> = sources.par_iter().filter(is_here).map(|s| dab(s, middle)).collect();
+        let dabs: Vec<Dab> =
+            sources.par_iter().filter(is_here).map(|s| dab(optics, grid, &layout, carrier, s, middle)).collect();
         for moment in &mut moments {
             moment.par_chunks_mut(1 << 16).for_each(|part| {
                 if !progress.stopped() {

@@ -37,13 +37,13 @@ const BAND: usize = 16;
 
 /// A point relative to its plane.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Dab {
+pub(in crate::hologram) struct Dab {
     /// Fractional column and row on the plane.
-    pub(super) at: [f64; 2],
+    pub(in crate::hologram) at: [f64; 2],
     /// Signed depth from the plane [m].
-    pub(super) d: f64,
+    pub(in crate::hologram) d: f64,
     /// Amplitude and phase, without what the kernels carry.
-    pub(super) factor: [f32; 2],
+    pub(in crate::hologram) factor: [f32; 2],
 }
 
 /// What all dabs share.

@@ -29,11 +29,11 @@ pub(super) struct Depths {
 
 /// Slabs in order of depth, and what they do to the error.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Slabs {
+pub(in crate::hologram) struct Slabs {
     /// Smallest and largest depth of each [m].
-    pub(super) depths: Vec<[f64; 2]>,
+    pub(in crate::hologram) depths: Vec<[f64; 2]>,
     /// Half depth of the thickest, h [m].
-    pub(super) half: f64,
+    pub(in crate::hologram) half: f64,
 }
 
 impl Depths {
@@ -117,11 +117,11 @@ impl Depths {
 
 impl Slabs {
     /// The slab of a depth.
-    pub(super) fn index(&self, depth: f64) -> usize {
+    pub(in crate::hologram) fn index(&self, depth: f64) -> usize {
         self.depths.partition_point(|slab| slab[1] < depth).min(self.depths.len().saturating_sub(1))
     }
     /// Depth of a slab's plane [m].
-    pub(super) fn plane(&self, index: usize) -> f64 {
+    pub(in crate::hologram) fn plane(&self, index: usize) -> f64 {
         0.5 * (self.depths[index][0] + self.depths[index][1])
     }
 }

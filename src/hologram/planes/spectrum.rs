@@ -31,13 +31,13 @@ const GAP: usize = 16;
 
 /// The periodic grid of the planes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Layout {
+pub(in crate::hologram) struct Layout {
     /// Columns and rows of the transforms, multiples of 16.
-    pub(super) size: [usize; 2],
+    pub(in crate::hologram) size: [usize; 2],
     /// Rows that can be painted; those below are dark.
-    pub(super) painted: usize,
+    pub(in crate::hologram) painted: usize,
     /// Panel column and row that stand at index 0 of the planes.
-    pub(super) origin: [i64; 2],
+    pub(in crate::hologram) origin: [i64; 2],
 }
 
 /// Phases of one plane, in turns.

@@ -54,7 +54,7 @@ impl Fineness {
 }
 
 /// Second-order mean of the separable fit along an axis: ⟨f²⟩ over |f| ≤ b [cycles²/m²].
-pub(super) fn mean_square(optics: &Optics, axis: usize) -> f64 {
+pub(in crate::hologram) fn mean_square(optics: &Optics, axis: usize) -> f64 {
     optics.taper[axis].middle.powi(2) / 3.0
 }
 
@@ -73,11 +73,11 @@ const KEPT: usize = 4;
 
 /// Kernels of one axis.
 #[derive(Debug)]
-pub(super) struct Table {
+pub(in crate::hologram) struct Table {
     /// ᾱ [cycles/m], taken out of the kernel and put back as a point's phase.
-    pub(super) mean: f64,
+    pub(in crate::hologram) mean: f64,
     /// Pixels from a row's middle to its ends.
-    pub(super) half: usize,
+    pub(in crate::hologram) half: usize,
     step: f64,
     phases: usize,
     /// Pixels of a row, [`PAD`] included.
@@ -85,9 +85,22 @@ pub(super) struct Table {
     values: Aligned,
 }
 
+/// Where a kernel stands in its table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::hologram) struct Place {
+    /// The pixel at or before its middle.
+    pub(in crate::hologram) pixel: isize,
+    /// Line of the first of four levels and two sub-pixel positions.
+    pub(in crate::hologram) line: usize,
+    /// Part of a level beyond the second of the four.
+    pub(in crate::hologram) u: f32,
+    /// Part of a position beyond the first of the two.
+    pub(in crate::hologram) t: f32,
+}
+
 impl Table {
     /// Half width of a row for depths up to `depth`, `tail` pixels beyond the cone.
-    pub(super) fn half_width(optics: &Optics, axis: usize, depth: f64, tail: f64) -> usize {
+    pub(in crate::hologram) fn half_width(optics: &Optics, axis: usize, depth: f64, tail: f64) -> usize {
         (optics.cone(axis, depth) / optics.pitch[axis] + tail).ceil() as usize + 2
     }
     /// Depth of a level, and number of levels, for depths up to `depth`.
@@ -97,7 +110,7 @@ impl Table {
         (step, (depth / step) as usize + 4)
     }
     /// Memory [bytes].
-    pub(super) fn bytes(optics: &Optics, axis: usize, depth: f64, tail: f64, fineness: Fineness) -> u64 {
+    pub(in crate::hologram) fn bytes(optics: &Optics, axis: usize, depth: f64, tail: f64, fineness: Fineness) -> u64 {
         let row = 2 * Self::half_width(optics, axis, depth, tail) + 2 + 2 * PAD;
         (Self::levels(optics, axis, depth, fineness).1 * (fineness.phases() + 1) * 2 * row * 4) as u64
     }
@@ -105,7 +118,7 @@ impl Table {
     /// Kernels for |d| ≤ `depth`, `tail` pixels beyond the cone; unspecified when asked to stop.
     ///
     /// The last few tables are kept, so that a fixed geometry (live viewing, animation, iterations) has its own at once.
-    pub(super) fn new(
+    pub(in crate::hologram) fn new(
         optics: &Optics,
         axis: usize,
         depth: f64,
@@ -187,6 +200,28 @@ impl Table {
         Self { mean, half, step, phases, row, values }
     }
 
+    /// Where the kernel of depth `d` at a position stands.
+    pub(in crate::hologram) fn place(&self, d: f64, position: f64) -> Place {
+        let depth = d.abs() / self.step;
+        let level = depth as usize;
+        let pixel = position.floor();
+        let fine = (position - pixel) * self.phases as f64;
+        let phase = (fine as usize).min(self.phases - 1);
+        Place {
+            pixel: pixel as isize,
+            line: level * (self.phases + 1) + phase,
+            u: (depth - level as f64) as f32,
+            t: (fine - phase as f64) as f32,
+        }
+    }
+
+    /// Its lines, real and imaginary parts of `row` values each, one level after another; `row`; the index in a row of
+    /// the kernel's middle; lines of a level.
+    #[cfg(feature = "gpu")]
+    pub(in crate::hologram) fn lines(&self) -> (&[f32], usize, usize, usize) {
+        (self.values.values(), self.row, self.half + PAD, self.phases + 1)
+    }
+
     /// Writes g(i − position; d) for the pixels i = first … first + count − 1 (`count` a multiple of the lanes) to `re`
     /// and `im`, zero beyond the row.
     ///
@@ -202,26 +237,19 @@ impl Table {
         re: *mut f32,
         im: *mut f32,
     ) {
-        let depth = d.abs() / self.step;
-        let level = depth as usize;
-        let u = (depth - level as f64) as f32;
+        let Place { pixel, line, u, t } = self.place(d, position);
         let lagrange = [
             -u * (u - 1.0) * (u - 2.0) / 6.0,
             (u + 1.0) * (u - 1.0) * (u - 2.0) / 2.0,
             -(u + 1.0) * u * (u - 2.0) / 2.0,
             (u + 1.0) * u * (u - 1.0) / 6.0,
         ];
-        let pixel = position.floor();
-        let fine = (position - pixel) * self.phases as f64;
-        let phase = (fine as usize).min(self.phases - 1);
-        let t = (fine - phase as f64) as f32;
         let sign = if d < 0.0 { -1.0 } else { 1.0 };
-        let rows: [usize; 8] =
-            std::array::from_fn(|n| ((level + n / 2) * (self.phases + 1) + phase + n % 2) * 2 * self.row);
+        let rows: [usize; 8] = std::array::from_fn(|n| (line + n / 2 * (self.phases + 1) + n % 2) * 2 * self.row);
         let values = self.values.values();
         assert!(rows[7] + 2 * self.row <= values.len(), "depth within the table");
         let weights: [f32; 8] = std::array::from_fn(|n| lagrange[n / 2] * if n % 2 == 0 { 1.0 - t } else { t });
-        let mut at = first - pixel as isize + self.half as isize + PAD as isize;
+        let mut at = first - pixel + self.half as isize + PAD as isize;
         let mut i = 0;
         // SAFETY: `at` is checked to lie in its row with a whole vector, rows lie in the table as asserted.
         unsafe {
