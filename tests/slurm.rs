@@ -119,18 +119,17 @@ impl Cluster {
             let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
             stat.rsplit_once(") ")?.1.split(' ').nth(1)?.parse().ok()
         };
-        let mut pids: Vec<u32> = tasks.to_vec();
-        // The helper of a task is the task's parent; it must be one of Slurm's.
-        pids.extend(tasks.iter().filter_map(|&task| parent(task)).filter(|pid| {
+        // The helper of a task is the task's parent; it must be one of Slurm's. Helpers first: one that outlives its task
+        // tells the controller that the task failed, and a failed task is not given again.
+        let helpers = tasks.iter().filter_map(|&task| parent(task)).filter(|pid| {
             fs::read_to_string(format!("/proc/{pid}/comm")).is_ok_and(|name| name.starts_with("slurmstepd"))
-        }));
+        });
+        let pids: Vec<String> = helpers.chain(tasks.iter().copied()).map(|pid| pid.to_string()).collect();
         if let Some((_, daemon)) = self.daemons.iter_mut().find(|(name, _)| name == node) {
             daemon.kill().expect("killed");
             daemon.wait().expect("ended");
         }
-        for pid in pids {
-            let _ = Command::new("kill").args(["-9", &pid.to_string()]).output();
-        }
+        let _ = Command::new("kill").arg("-9").args(&pids).output();
     }
 }
 

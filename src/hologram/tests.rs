@@ -287,6 +287,23 @@ fn gpu_equals_the_oracle() {
 }
 
 #[test]
+fn crowds_on_the_gpu_are_summed_whole_and_to_the_same_bits() {
+    let Some(adapter) = adapter() else { return };
+    // More points in a cell than one dispatch takes: its parts must not be summed at once.
+    let grid = Grid::new(520, 300, 8e-6, 8e-6).expect("grid");
+    let points = cloud(700, [0.0; 2], [4e-3, 2e-3], [-0.2, -0.25], false);
+    let set = InstructionSet::detect();
+    let exact = field(&points, &grid, &settings(Method::Direct, 1e-3, set)).field;
+    for error in [2e-3, 2e-5] {
+        let got = field(&points, &grid, &settings(Method::Gpu, error, set));
+        let found = relative_error(&got.field.samples, &exact.samples);
+        println!("{adapter} crowd {error:.0e}: {found:.2e}, bound {:.2e}", got.report.error_bound);
+        assert!(found < got.report.error_bound + 1e-4, "{error:.0e}: {found:.2e}");
+        assert_eq!(got.field, field(&points, &grid, &settings(Method::Gpu, error, set)).field, "{error:.0e}");
+    }
+}
+
+#[test]
 fn planes_on_the_gpu_of_every_rank_and_of_crowds_equal_those_of_the_cpu() {
     let Some(adapter) = adapter() else { return };
     // Square pixels: one table for both axes. A crowd that one tile takes in several dispatches.

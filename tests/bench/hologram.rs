@@ -1,7 +1,8 @@
 //! Time, rate and error of the hologram engines; every figure against the f64 oracle at the full number of points.
 //!
 //! `cargo bench --bench hologram -- [case…]`, cases: `main` (161,056 points → 1920 × 1080, 8 µm, 632.8 nm,
-//! z −0.20 … −0.25 m, every engine against 20,000 exact pixels; the default), `quick` (the same against 500), `million`,
+//! z −0.20 … −0.25 m, every engine against 20,000 exact pixels, random and smooth phase; the default), `random` or `smooth` (one of
+//! them), `quick` (both against 500), `million`,
 //! `uhd` (3840 × 2160, 3.74 µm, z −0.10 … −0.15 m), `growth` (against points and pixels, beside the cost model),
 //! `planner` (its choice against the best engine), `sets` (instruction sets), `gpu`.
 
@@ -122,9 +123,9 @@ fn uhd() -> Grid {
     Grid::new(3840, 2160, 3.74e-6, 3.74e-6).expect("grid")
 }
 
-fn main_case(pixels: usize) {
+fn main_case(pixels: usize, phases: &[bool]) {
     let grid = hd();
-    for smooth in [false, true] {
+    for &smooth in phases {
         let label = if smooth { "main, smooth phase" } else { "main, random phase" };
         let points = cloud(161_056, &grid, [-0.25, -0.20], smooth);
         let reference = Reference::new(&points, &grid, pixels);
@@ -252,8 +253,15 @@ fn main() {
         std::thread::available_parallelism().map_or(0, |n| n.get()),
         InstructionSet::detect().name()
     );
-    if has("main") || has("quick") {
-        main_case(if has("main") { 20_000 } else { 500 });
+    for (name, pixels, phases) in [
+        ("main", 20_000, &[false, true][..]),
+        ("random", 20_000, &[false]),
+        ("smooth", 20_000, &[true]),
+        ("quick", 500, &[false, true]),
+    ] {
+        if has(name) {
+            main_case(pixels, phases);
+        }
     }
     large_cases(has("million"), has("uhd"));
     let others: [(&str, fn()); 4] = [("growth", growth), ("planner", planner), ("sets", sets), ("gpu", gpu)];

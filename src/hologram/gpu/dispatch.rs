@@ -109,7 +109,9 @@ impl<'a> Engine<'a> {
                 points.extend_from_slice(now);
                 pairs += pixels(*at) * now.len() as f64;
                 rest = later;
-                if pairs >= self.pairs || points.len() == CHUNK || cells.len() == CELLS {
+                // A cell stands in a dispatch once: two groups that add to the same pixels would lose one another's sums.
+                let split = !rest.is_empty();
+                if split || pairs >= self.pairs || points.len() == CHUNK || cells.len() == CELLS {
                     self.submit(pipeline, group, &points, &cells, progress)?;
                     points.clear();
                     cells.clear();

@@ -147,14 +147,28 @@ var<workgroup> x_im: array<vec4<f32>, 128>;
 var<workgroup> y_re: array<vec4<f32>, 128>;
 var<workgroup> y_im: array<vec4<f32>, 128>;
 
-fn add(column: u32, row: u32, re: vec4<f32>, im: vec4<f32>) {
+// Four pixels of the field so far; sums go on from it, so that they are the same bits wherever the points were divided.
+fn so_far(column: u32, row: u32) -> Complex4 {
+    var sum = Complex4(vec4(0.0), vec4(0.0));
+    if (row < job.height) {
+        for (var i = 0u; i < 4u; i++) {
+            if (column + i < job.width) {
+                let u = field[row * job.width + column + i];
+                sum.re[i] = u.x;
+                sum.im[i] = u.y;
+            }
+        }
+    }
+    return sum;
+}
+
+fn store(column: u32, row: u32, re: vec4<f32>, im: vec4<f32>) {
     if (row >= job.height) {
         return;
     }
     for (var i = 0u; i < 4u; i++) {
         if (column + i < job.width) {
-            let at = row * job.width + column + i;
-            field[at] = field[at] + vec2(re[i], im[i]);
+            field[row * job.width + column + i] = vec2(re[i], im[i]);
         }
     }
 }
@@ -172,14 +186,20 @@ fn separable(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     let mine = thread / 4u;
     let part = (thread % 4u) * 2u;
     let lane = vec4(0.0, 1.0, 2.0, 3.0) - 15.5;
-    var re0 = vec4(0.0);
-    var re1 = vec4(0.0);
-    var re2 = vec4(0.0);
-    var re3 = vec4(0.0);
-    var im0 = vec4(0.0);
-    var im1 = vec4(0.0);
-    var im2 = vec4(0.0);
-    var im3 = vec4(0.0);
+    let column = cell.x + tile.x + 4u * place.x;
+    let row = cell.y + tile.y + 4u * place.y;
+    let sum0 = so_far(column, row);
+    let sum1 = so_far(column, row + 1u);
+    let sum2 = so_far(column, row + 2u);
+    let sum3 = so_far(column, row + 3u);
+    var re0 = sum0.re;
+    var re1 = sum1.re;
+    var re2 = sum2.re;
+    var re3 = sum3.re;
+    var im0 = sum0.im;
+    var im1 = sum1.im;
+    var im2 = sum2.im;
+    var im3 = sum3.im;
     for (var first = 0u; first < cell.w; first += BATCH) {
         let count = min(BATCH, cell.w - first);
         if (mine < count) {
@@ -212,12 +232,10 @@ fn separable(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
         }
         workgroupBarrier();
     }
-    let column = cell.x + tile.x + 4u * place.x;
-    let row = cell.y + tile.y + 4u * place.y;
-    add(column, row, re0, im0);
-    add(column, row + 1u, re1, im1);
-    add(column, row + 2u, re2, im2);
-    add(column, row + 3u, re3, im3);
+    store(column, row, re0, im0);
+    store(column, row + 1u, re1, im1);
+    store(column, row + 2u, re2, im2);
+    store(column, row + 3u, re3, im3);
 }
 
 // Every pixel from its own path: for angles and distances at which no tile is small enough.
@@ -233,8 +251,9 @@ fn exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
             continue;
         }
         let offset_y = (f32(row) - 127.5) * job.pitch.y;
-        var re = vec4(0.0);
-        var im = vec4(0.0);
+        let sum = so_far(cell.x + column, cell.y + row);
+        var re = sum.re;
+        var im = sum.im;
         for (var k = cell.z; k < cell.z + cell.w; k++) {
             let p = points[k];
             let ex = offset_x * p.inverse;
@@ -264,6 +283,6 @@ fn exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
             re += wave.re * size;
             im += wave.im * size;
         }
-        add(cell.x + column, cell.y + row, re, im);
+        store(cell.x + column, cell.y + row, re, im);
     }
 }
