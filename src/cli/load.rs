@@ -99,10 +99,10 @@ pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, defau
     };
     SceneSettings {
         load: LoadOptions {
-            camera: light.camera.as_deref().map(Choice::from),
-            clip: light.animation.as_deref().map_or(Clip::First, |name| Clip::Of(Choice::from(name))),
-            time: light.time,
-            viewer_light: light.viewer_light,
+            camera: light.file.camera.as_deref().map(Choice::from),
+            clip: light.file.animation.as_deref().map_or(Clip::First, |name| Clip::Of(Choice::from(name))),
+            time: light.file.time,
+            viewer_light: light.file.viewer_light,
             ..LoadOptions::default()
         },
         illumination: IlluminationSettings {

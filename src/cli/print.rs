@@ -42,10 +42,10 @@ fn compute(args: &PrintArgs, json: bool) -> Result<Report> {
         None => Shard::default(),
     };
     let task = Task {
-        camera: args.light.camera.clone(),
-        animation: args.light.animation.clone(),
-        time: args.light.time,
-        viewer_light: args.light.viewer_light,
+        camera: args.light.file.camera.clone(),
+        animation: args.light.file.animation.clone(),
+        time: args.light.file.time,
+        viewer_light: args.light.file.viewer_light,
         bounces: args.light.bounces,
         photons: args.light.photons,
         white: match args.light.white {
@@ -323,7 +323,7 @@ fn look(args: &PreviewArgs) -> Result<Report> {
         "seconds",
         taken,
         format!(
-            "simulated view in focus at z = {}, {:.2} × {:.2} mm, every {}th column and {}th row of light kept, in {}",
+            "simulated view in focus at z = {}, {:.2} × {:.2} mm, one column of {} and one row of {} of light kept, in {}",
             show_length(focus),
             seen.half.x * 2e3,
             seen.half.y * 2e3,

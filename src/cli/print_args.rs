@@ -1,7 +1,7 @@
 //! Flags of plates.
 
 use super::args::size;
-use super::scene_args::{White, white};
+use super::scene_args::{FileArgs, White, white};
 use clap::{Args, Subcommand, ValueEnum};
 use holodrive::units;
 use std::path::PathBuf;
@@ -30,21 +30,11 @@ pub(crate) struct PrintArgs {
     pub(crate) light: PlateLightArgs,
 }
 
-/// How a plate's scene is lit.
+/// How a plate's scene is lit; the camera's direction is that of the viewer.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct PlateLightArgs {
-    /// Camera of the scene, by name or number: its direction is that of the viewer [default: the first].
-    #[arg(long, value_name = "NAME")]
-    pub(crate) camera: Option<String>,
-    /// Animation clip, by name or number.
-    #[arg(long, value_name = "NAME")]
-    pub(crate) animation: Option<String>,
-    /// Time in the animation [s].
-    #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
-    pub(crate) time: f64,
-    /// Add the light that a file without any gets.
-    #[arg(long)]
-    pub(crate) viewer_light: bool,
+    #[command(flatten)]
+    pub(crate) file: FileArgs,
     /// Most mirrors and glass surfaces on a path of light.
     #[arg(long, default_value_t = 32, value_name = "N")]
     pub(crate) bounces: u32,

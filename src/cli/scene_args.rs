@@ -32,16 +32,9 @@ fn wavelengths(text: &str) -> Result<Wavelengths, String> {
         .map_err(|_| format!("`{text}` is not three wavelengths such as 638nm,520nm,450nm"))
 }
 
-/// How a scene is lit and traced.
+/// What of a file is taken, and the light that is added to it.
 #[derive(Clone, Debug, Args)]
-pub(crate) struct SceneArgs {
-    /// Rays across and down.
-    #[arg(long, default_value = "500x500", value_parser = size, value_name = "WxH")]
-    pub(crate) rays: (usize, usize),
-    /// About this many points, whatever part of the picture is dark: only the shape of --rays is kept. At most what the
-    /// panel resolves; `eye` takes what an eye at --viewer resolves, `panel` what the panel does.
-    #[arg(long, value_parser = points, value_name = "N|eye|panel")]
-    pub(crate) points: Option<Budget>,
+pub(crate) struct FileArgs {
     /// Camera of the scene, by name or number [default: the first].
     #[arg(long, value_name = "NAME")]
     pub(crate) camera: Option<String>,
@@ -54,6 +47,20 @@ pub(crate) struct SceneArgs {
     /// Add the light that a file without any gets, from the viewer's upper left and the camera, to the file's own.
     #[arg(long)]
     pub(crate) viewer_light: bool,
+}
+
+/// How a scene is lit and traced.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct SceneArgs {
+    /// Rays across and down.
+    #[arg(long, default_value = "500x500", value_parser = size, value_name = "WxH")]
+    pub(crate) rays: (usize, usize),
+    /// About this many points, whatever part of the picture is dark: only the shape of --rays is kept. At most what the
+    /// panel resolves; `eye` takes what an eye at --viewer resolves, `panel` what the panel does.
+    #[arg(long, value_parser = points, value_name = "N|eye|panel")]
+    pub(crate) points: Option<Budget>,
+    #[command(flatten)]
+    pub(crate) file: FileArgs,
     /// Form factors: exact (1/π, polygons), or the seed paper's eq. (1) for comparison (half of the light is lost).
     #[arg(long, value_enum, default_value_t = FormFactorArg::Exact)]
     pub(crate) form_factor: FormFactorArg,

@@ -103,6 +103,31 @@ fn planes_keep_the_error_that_they_state() {
 }
 
 #[test]
+fn planes_keep_their_error_where_the_panel_sees_the_corners_of_the_cones() {
+    let grid = Grid::new(205, 131, 8e-6, 8e-6).expect("grid");
+    let optics = Optics::new(&grid, WAVELENGTH).expect("optics");
+    let mut kept = 0;
+    for z in [[-0.1, -0.15], [-0.2, -0.25]] {
+        let cone = optics.cone(0, -0.5 * (z[0] + z[1]));
+        for shift in [0.7, 0.85, 0.95, 1.05] {
+            let points = cloud(40, [shift * cone, 0.9 * shift * cone], [0.1 * cone, 0.02 * cone], z, false);
+            let exact = oracle(&points, &grid, WAVELENGTH, Cull::Soft).expect("oracle");
+            for error in [1.5e-2, 3e-3, 8e-4] {
+                let settings = settings(Method::Planes, error, InstructionSet::detect());
+                // At the very corner planes refuse what they cannot promise.
+                let Ok(plan) = plan(&points, &grid, WAVELENGTH, &settings) else { continue };
+                let got = compute(&points, &grid, WAVELENGTH, &plan, &Progress::new()).expect("field");
+                let (found, bound) = (relative_error(&got.field.samples, &exact.samples), got.report.error_bound);
+                println!("{z:?} shifted by {shift} of the cone, {error:.1e}: {found:.2e}, bound {bound:.2e}");
+                assert!(found < bound && bound <= error, "{z:?} {shift} {error:.1e}: {found:.2e}, bound {bound:.2e}");
+                kept += 1;
+            }
+        }
+    }
+    assert!(kept >= 16, "planes served {kept} of 24");
+}
+
+#[test]
 fn wide_angles_are_exact() {
     let grid = Grid::new(161, 95, 1e-6, 1.25e-6).expect("grid").centered_at([1e-3, 0.4e-3]);
     let points = cloud(40, [0.2e-3, 0.0], [3e-3, 3e-3], [-5e-3, -10e-3], false);

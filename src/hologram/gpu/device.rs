@@ -1,5 +1,6 @@
 //! The graphics processor: found once, kept for the life of the process.
 
+use super::record::pipelines;
 use crate::error::{Error, Result};
 use pixels::wgpu;
 use std::pin::pin;
@@ -64,17 +65,7 @@ impl Device {
                 fault.get_or_insert_with(|| error.to_string().replace('\n', " "));
             }
         }));
-        let module = device.create_shader_module(wgpu::include_wgsl!("sum.wgsl"));
-        let pipelines = ["separable", "exact"].map(|entry| {
-            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(entry),
-                layout: None,
-                module: &module,
-                entry_point: Some(entry),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                cache: None,
-            })
-        });
+        let pipelines = pipelines(&device, wgpu::include_wgsl!("sum.wgsl"), ["separable", "exact"]);
         let opened =
             Self { name, software: info.device_type == wgpu::DeviceType::Cpu, device, queue, pipelines, fault };
         opened.check().map_err(|e| e.to_string())?;

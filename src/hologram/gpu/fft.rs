@@ -138,8 +138,9 @@ impl Transform {
 /// The pipelines of radices 2, 3, 4 and 5.
 fn pipelines_of(device: &Device) -> &'static [wgpu::ComputePipeline; 4] {
     static PIPELINES: OnceLock<[wgpu::ComputePipeline; 4]> = OnceLock::new();
-    PIPELINES
-        .get_or_init(|| pipelines(device, wgpu::include_wgsl!("fft.wgsl"), ["radix2", "radix3", "radix4", "radix5"]))
+    PIPELINES.get_or_init(|| {
+        pipelines(&device.device, wgpu::include_wgsl!("fft.wgsl"), ["radix2", "radix3", "radix4", "radix5"])
+    })
 }
 
 #[cfg(test)]

@@ -101,7 +101,7 @@ pub(crate) fn cost(optics: &Optics, grid: &Grid, cloud: &Cloud, parameters: &Par
 fn shaders(device: &Device) -> &'static [wgpu::ComputePipeline; 3] {
     static PIPELINES: OnceLock<[wgpu::ComputePipeline; 3]> = OnceLock::new();
     PIPELINES.get_or_init(|| {
-        pipelines(device, wgpu::include_wgsl!("planes.wgsl"), ["paint_tile", "add_plane", "cut_window"])
+        pipelines(&device.device, wgpu::include_wgsl!("planes.wgsl"), ["paint_tile", "add_plane", "cut_window"])
     })
 }
 

@@ -52,13 +52,13 @@ pub(super) fn group(device: &Device, pipeline: &wgpu::ComputePipeline, buffers: 
 
 /// Pipelines of a module's entry points.
 pub(super) fn pipelines<const N: usize>(
-    device: &Device,
+    device: &wgpu::Device,
     source: wgpu::ShaderModuleDescriptor,
     entries: [&str; N],
 ) -> [wgpu::ComputePipeline; N] {
-    let module = device.device.create_shader_module(source);
+    let module = device.create_shader_module(source);
     entries.map(|entry| {
-        device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(entry),
             layout: None,
             module: &module,

@@ -244,10 +244,10 @@ fn tail_error(tail: f64, cone: f64) -> f64 {
 
 /// What the stated error stands above the model's, by how steeply the panel sees the cloud (1 whole cones, 3 nothing but
 /// their corners): towards the corners the light fades and the kernels' cut tails do not. Measured at most 1.36 up to a
-/// steepness of 1.5, 1.9 at 2.0, 2.8 at 2.45 and 7.1 at 2.74, on clouds that are shifted out of the panel's view.
+/// steepness of 1.5, 1.9 at 2.0, 3.8 at 2.4 and 7.1 at 2.74, on clouds that are shifted out of the panel's view.
 fn margin(steepness: f64) -> f64 {
     let corner = (0.5 * (steepness - 1.0)).clamp(0.0, 1.0);
-    1.45 / (1.0 - corner.powf(1.4)).max(1e-3)
+    1.45 / (1.0 - corner.powf(1.1)).max(1e-3)
 }
 
 /// Where a point's light has died away on the panel, but for the taper's tail [m]: erfc(2.6)/2 = 1.2e-4.
