@@ -50,6 +50,23 @@ fn partial_name(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}.{}-{number}.partial", std::process::id()))
 }
 
+/// Free space [bytes] for files in a folder that may not exist yet; none where the system does not tell.
+pub fn free_space(folder: &Path) -> Option<u64> {
+    let there = std::path::absolute(folder).ok()?.ancestors().find(|a| a.is_dir())?.to_path_buf();
+    free_in(&there)
+}
+
+#[cfg(unix)]
+fn free_in(folder: &Path) -> Option<u64> {
+    let disk = rustix::fs::statvfs(folder).ok()?;
+    disk.f_bavail.checked_mul(disk.f_frsize)
+}
+
+#[cfg(not(unix))]
+fn free_in(_: &Path) -> Option<u64> {
+    None
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,7 +6,7 @@ use holodrive::encode::Encoding;
 use holodrive::units;
 use std::path::PathBuf;
 
-pub(crate) use super::print_args::{ExportArgs, ExportFormat, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs};
+pub(crate) use super::print_args::{ExportArgs, ExportFormat, PrintArgs, PrintCommand, VerifyArgs};
 pub(crate) use super::scene_args::{
     ColorArgs, DepthArg, FormFactorArg, MirrorDepthArg, PhaseArg, PlacementArg, PlacementArgs, SceneArgs, Wavelengths,
     White,

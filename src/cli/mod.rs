@@ -14,6 +14,7 @@ mod monitors;
 mod parallax;
 mod print;
 mod print_args;
+mod print_preview;
 mod report;
 mod scene_args;
 #[cfg(feature = "display")]

@@ -1,22 +1,20 @@
 //! Plates: planned, computed, checked, looked at, exported.
 
-use super::args::{ExportArgs, ExportFormat, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs, White};
+use super::args::{ExportArgs, ExportFormat, PrintArgs, PrintCommand, VerifyArgs, White};
 use super::bar::Bar;
 use super::report::{Report, count, seconds};
+use holodrive::files;
 use holodrive::hologram::InstructionSet;
 use holodrive::print::export::{Format, Frames, export};
-use holodrive::print::preview::{PreviewSettings, preview};
 use holodrive::print::{Manifest, Plan, Plate, Shard, Source, Task, job, plan, sample};
-use holodrive::reconstruction::metrics::{blocks, likeness};
-use holodrive::reconstruction::{Picture, Scale};
-use holodrive::units::{self, show_length};
+use holodrive::units::show_length;
 use holodrive::{Error, Result};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 pub(super) fn print(args: &PrintArgs, json: bool) -> Result<Report> {
     match &args.command {
         Some(PrintCommand::Verify(args)) => verify(args),
-        Some(PrintCommand::Preview(args)) => look(args),
+        Some(PrintCommand::Preview(args)) => super::print_preview::look(args),
         Some(PrintCommand::Export(args)) => write(args),
         None => compute(args, json),
     }
@@ -75,8 +73,13 @@ fn compute(args: &PrintArgs, json: bool) -> Result<Report> {
             None => {
                 let sampled = sample(maker, progress)?;
                 let planned = plan(maker, &sampled);
-                let told = report_plan(&planned, &plate, set);
+                let free = files::free_space(folder);
+                let told = report_plan(&planned, &plate, set, free);
                 report.warn(planned.warnings.iter());
+                if let Some(free) = free.filter(|free| *free < planned.disk) {
+                    let what = format!("the disk has {} free: the work will stop when it is full", bytes(free));
+                    report.warn(std::iter::once(&what));
+                }
                 if args.dry_run {
                     report.add_part("plan", "plan", told);
                     return Ok(());
@@ -178,7 +181,7 @@ fn bytes(bytes: u64) -> String {
     }
 }
 
-fn report_plan(plan: &Plan, plate: &Plate, set: InstructionSet) -> Report {
+fn report_plan(plan: &Plan, plate: &Plate, set: InstructionSet, free: Option<u64>) -> Report {
     let mut report = Report::new("plan");
     let degrees = |angles: [f64; 2]| format!("{:.2} x {:.2} deg", angles[0].to_degrees(), angles[1].to_degrees());
     let [width, height] = plan.size;
@@ -235,8 +238,14 @@ fn report_plan(plan: &Plan, plate: &Plate, set: InstructionSet) -> Report {
     report.add("rays", plan.rays, "");
     report.add("pairs", plan.pairs, format!("pairs        {:.2e} points times pixels", plan.pairs));
     report.add("amplitude", plan.amplitude, "");
-    report.add("memory", plan.memory, format!("memory       about {}; disk {}", bytes(plan.memory), bytes(plan.disk)));
+    let of = free.map(|free| format!(" of {} free", bytes(free))).unwrap_or_default();
+    report.add(
+        "memory",
+        plan.memory,
+        format!("memory       about {}; disk {}{of}", bytes(plan.memory), bytes(plan.disk)),
+    );
     report.add("disk", plan.disk, "");
+    report.add_serialised("disk_free", &free, "");
     report.add_serialised("files", &plan.files, "");
     report.add_serialised("resolution", &plan.resolution, "");
     report.add("instruction_set", set.name(), "");
@@ -268,86 +277,6 @@ fn verify(args: &VerifyArgs) -> Result<Report> {
             seconds(found.seconds)
         ),
     );
-    Ok(report)
-}
-
-/// `name.png` → `name-traced.png`.
-fn beside(path: &Path) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!("{stem}-traced.png"))
-}
-
-fn look(args: &PreviewArgs) -> Result<Report> {
-    let mut report = Report::new("print preview");
-    let manifest = Manifest::of(&args.folder)?;
-    let plate = &manifest.settings.plate;
-    let focus = units::length(&args.focus)?;
-    let signed = args.focus.trim_start().starts_with(['+', '-']);
-    let focus = if !signed && plate.place < 0.0 { -focus } else { focus };
-    let [_, _, columns, rows] = args.part.unwrap_or([0, 0, plate.width, plate.height]);
-    let (wide, tall) = (columns as f64 * plate.pitch_x, rows as f64 * plate.pitch_y);
-    let side = |length: f64| ((400.0 * length / wide.max(tall)).round() as usize).max(1);
-    let settings = PreviewSettings {
-        eye: args.eye,
-        pupil: args.pupil,
-        focus,
-        size: args.size.unwrap_or((side(wide), side(tall))),
-        part: args.part,
-        memory: args.memory,
-    };
-    let bar = Bar::new();
-    let begin = std::time::Instant::now();
-    let seen = preview(&args.folder, &settings, &bar.progress)?;
-    let taken = begin.elapsed().as_secs_f64();
-    let described = serde_json::json!({
-        "simulated": true,
-        "eye": args.eye,
-        "focus": focus,
-        "pupil": args.pupil,
-        "center": seen.center,
-        "half": seen.half.to_array(),
-    });
-    let texts = |what: &str| [("Description", what.to_owned()), ("holodrive", described.to_string())];
-    seen.picture.write_png(
-        &args.output,
-        Scale::Percentile(args.white),
-        &texts("simulated view of a plate's fringes"),
-    )?;
-    report.add("eye", args.eye.to_vec(), "");
-    report.add("focus", focus, "");
-    report.add("center", seen.center.to_vec(), "");
-    report.add("half", seen.half.to_array().to_vec(), "");
-    report.add("passed", seen.passed, "");
-    report.add("thinned", seen.thinned.to_vec(), "");
-    report.add(
-        "seconds",
-        taken,
-        format!(
-            "simulated view in focus at z = {}, {:.2} × {:.2} mm, one column of {} and one row of {} of light kept, in {}",
-            show_length(focus),
-            seen.half.x * 2e3,
-            seen.half.y * 2e3,
-            seen.thinned[0],
-            seen.thinned[1],
-            seconds(taken)
-        ),
-    );
-    if let Some(scene) = &args.traced {
-        let task = Task::of(scene.clone(), &manifest.settings)?;
-        let (traced, white) = task.traced(plate, args.eye, focus, &seen, &bar.progress)?;
-        let path = beside(&args.output);
-        traced.write_png(&path, Scale::White(white), &texts("traced view from the same eye"))?;
-        let alike = likeness(&seen.picture, &traced, white);
-        // Speckle is averaged out over blocks of four cells.
-        let averaged = |picture: &Picture| blocks(picture, 4);
-        let smooth = likeness(&averaged(&seen.picture), &averaged(&traced), white);
-        report.add_serialised("likeness", &alike, "");
-        report.add_serialised("likeness_of_blocks", &smooth, "");
-        let line =
-            format!("traced       {}: SSIM {:.3}, over 4 × 4 cells {:.3}", path.display(), alike.ssim, smooth.ssim);
-        report.add("traced", path.display().to_string(), line);
-    }
-    report.add("output", args.output.display().to_string(), format!("picture      {}", args.output.display()));
     Ok(report)
 }
 

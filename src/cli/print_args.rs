@@ -82,6 +82,9 @@ pub(crate) struct PreviewArgs {
     /// Diameter of the eye's pupil.
     #[arg(long, default_value = "4mm", value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) pupil: f64,
+    /// Wavelength of the lamp [default: the plate's; all three of a plate in colour].
+    #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
+    pub(crate) wavelength: Option<f64>,
     /// The picture to write (8 bit, sRGB-coded).
     #[arg(short, long, default_value = "preview.png", value_name = "FILE")]
     pub(crate) output: PathBuf,

@@ -18,6 +18,7 @@
 use super::geometry::{Piece, Rect, border, fringe_area, pieces, plate_from_file, tile_in_file, tile_on_plate};
 use super::plate::{Binarisation, Plate, Polarity, Quantity};
 use super::reference::Band;
+use super::slit::Strip;
 use super::views::Source;
 use crate::encode::error_diffusion::diffuse;
 use crate::error::Result;
@@ -103,6 +104,18 @@ impl Maker<'_> {
         let quiet = progress.part();
         for piece in pieces {
             let begin = Instant::now();
+            if let Some(slit) = &self.plate.slit {
+                let strip = Strip::new(self.plate, slit, piece.segment[1]);
+                let points = self.source.line(self.plate, &self.band, piece.segment, &strip, &quiet)?;
+                work.points_seconds += begin.elapsed().as_secs_f64();
+                work.segments += 1;
+                work.points += points.len() as u64;
+                let begin = Instant::now();
+                work.pairs += strip.field(self.plate, &self.band, &points, &piece.rect, rect, &mut field);
+                work.field_seconds += begin.elapsed().as_secs_f64();
+                quiet.check()?;
+                continue;
+            }
             let points = self.source.points(self.plate, &self.band, piece.segment, &quiet)?;
             work.points_seconds += begin.elapsed().as_secs_f64();
             work.segments += 1;
@@ -170,7 +183,8 @@ impl Maker<'_> {
         out.par_chunks_mut(rect.width()).zip(field.par_chunks(rect.width())).enumerate().for_each_init(
             Vec::new,
             |reference, (i, (out, field))| {
-                plate.reference.row(plate, rect.y[0] + i as i64, rect.x[0]..rect.x[1], reference);
+                let row = rect.y[0] + i as i64;
+                plate.reference.row(plate, plate.wavelength_of(row), row, rect.x[0]..rect.x[1], reference);
                 for ((t, &u), &r) in out.iter_mut().zip(field).zip(reference.iter()) {
                     let value = value(u, r).clamp(0.0, 1.0);
                     *t = if plate.polarity == Polarity::Negative { 1.0 - value } else { value };
@@ -178,6 +192,15 @@ impl Maker<'_> {
             },
         );
         out
+    }
+
+    /// The same after binarisation, where the plate has one bit.
+    pub(super) fn levels(&self, field: &[Complex32], rect: &Rect, amplitude: f32) -> Vec<f32> {
+        let mut levels = self.fringe(field, rect, amplitude);
+        if self.plate.bits == 1 {
+            binarise(&mut levels, rect.width(), self.plate.binarisation);
+        }
+        levels
     }
 
     /// The levels of a tile as the file shows them, `tile × tile` of them, 0 beyond the plate's edge; `amplitude` swings
@@ -209,11 +232,8 @@ impl Maker<'_> {
             let (field, took) = self.field(&grown, &pieces(plate, &core, &grown), progress)?;
             work = took;
             let begin = Instant::now();
-            wishes = self.fringe(&field, &grown, amplitude);
+            wishes = self.levels(&field, &grown, amplitude);
             drop(field);
-            if plate.bits == 1 {
-                binarise(&mut wishes, grown.width(), plate.binarisation);
-            }
             work.fringe_seconds += begin.elapsed().as_secs_f64();
         }
         progress.check()?;

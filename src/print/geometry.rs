@@ -95,8 +95,8 @@ pub struct Piece {
 
 /// Cuts `grown` into the segments that `core` lies in: what is outside of the core goes with the segment beside it.
 pub fn pieces(plate: &Plate, core: &Rect, grown: &Rect) -> Vec<Piece> {
-    let side = plate.segment as i64;
-    let cuts = |core: [i64; 2], grown: [i64; 2]| -> Vec<(i64, [i64; 2])> {
+    let [wide, tall] = plate.segment_size().map(|side| side as i64);
+    let cuts = |core: [i64; 2], grown: [i64; 2], side: i64| -> Vec<(i64, [i64; 2])> {
         let (first, last) = (core[0].div_euclid(side), (core[1] - 1).div_euclid(side));
         (first..=last)
             .map(|segment| {
@@ -106,8 +106,8 @@ pub fn pieces(plate: &Plate, core: &Rect, grown: &Rect) -> Vec<Piece> {
             })
             .collect()
     };
-    let columns = cuts(core.x, grown.x);
-    cuts(core.y, grown.y)
+    let columns = cuts(core.x, grown.x, wide);
+    cuts(core.y, grown.y, tall)
         .into_iter()
         .flat_map(|(row, y)| {
             columns.iter().map(move |&(column, x)| Piece { segment: [column, row], rect: Rect { x, y } })
@@ -117,9 +117,10 @@ pub fn pieces(plate: &Plate, core: &Rect, grown: &Rect) -> Vec<Piece> {
 
 /// Middle of a segment [m].
 pub(super) fn segment_center(plate: &Plate, segment: [i64; 2]) -> [f64; 2] {
-    let side = plate.segment as f64;
-    let at = |index: i64, size: u64, pitch: f64| ((index as f64 + 0.5) * side - 0.5 * size as f64) * pitch;
-    [at(segment[0], plate.width, plate.pitch_x), -at(segment[1], plate.height, plate.pitch_y)]
+    let [wide, tall] = plate.segment_size();
+    let at =
+        |index: i64, side: u64, size: u64, pitch: f64| ((index as f64 + 0.5) * side as f64 - 0.5 * size as f64) * pitch;
+    [at(segment[0], wide, plate.width, plate.pitch_x), -at(segment[1], tall, plate.height, plate.pitch_y)]
 }
 
 /// Level of a pixel of the guard border, as a share of the highest: dark, with bright crosses in its corners.

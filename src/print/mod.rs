@@ -9,6 +9,7 @@
 //! whatever the plate.
 
 pub mod export;
+mod fan;
 mod fringe;
 mod gds;
 mod geometry;
@@ -20,6 +21,7 @@ pub mod preview;
 mod reference;
 mod scene;
 mod shard;
+mod slit;
 #[cfg(test)]
 mod tests;
 mod tiff;
@@ -34,4 +36,5 @@ pub use plate::{Binarisation, Plate, Polarity, Quantity};
 pub use reference::{Band, Reference, Side};
 pub use scene::Task;
 pub use shard::Shard;
+pub use slit::Slit;
 pub use views::{Source, Views};

@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::field::Complex32;
 use crate::progress::Progress;
 use serde::Serialize;
+use std::time::Instant;
 
 /// Segments looked at along each side of the plate.
 const LATTICE: i64 = 4;
@@ -27,6 +28,8 @@ pub struct Sample {
     pub most_points: u64,
     /// What the fields took.
     pub work: Work,
+    /// What the whole of the segment with the most points took: small fields do not tell the speed of large ones.
+    pub whole: Work,
     /// Segments of the plate.
     pub segments: u64,
 }
@@ -79,41 +82,51 @@ pub struct Plan {
 pub fn sample(maker: &Maker, progress: &Progress) -> Result<Sample> {
     let plate = maker.plate;
     let area = fringe_area(plate);
-    let side = plate.segment as i64;
-    let across = |range: [i64; 2]| [range[0].div_euclid(side), (range[1] - 1).div_euclid(side)];
-    let (columns, rows) = (across(area.x), across(area.y));
+    let sides = plate.segment_size().map(|side| side as i64);
+    let across = |range: [i64; 2], side: i64| [range[0].div_euclid(side), (range[1] - 1).div_euclid(side)];
+    let (columns, rows) = (across(area.x, sides[0]), across(area.y, sides[1]));
     let pick = |[first, last]: [i64; 2], i: i64| first + ((2 * i + 1) * (last - first + 1)) / (2 * LATTICE);
     let mut places: Vec<[i64; 2]> =
         (0..LATTICE * LATTICE).map(|i| [pick(columns, i % LATTICE), pick(rows, i / LATTICE)]).collect();
-    if let Source::Cloud(points) = maker.source {
+    if let Source::Cloud(points) | Source::ColorCloud([points, ..]) = maker.source {
         // The light of points near the plate is where they are: a lattice of places may miss it.
         let count = points.len();
         for point in (0..16).filter_map(|i| points.get((2 * i + 1) * count / 32)) {
             let column = (point.position.x / plate.pitch_x + 0.5 * plate.width as f64).floor() as i64;
             let row = (0.5 * plate.height as f64 - point.position.y / plate.pitch_y).floor() as i64;
             if (area.x[0]..area.x[1]).contains(&column) && (area.y[0]..area.y[1]).contains(&row) {
-                places.push([column.div_euclid(side), row.div_euclid(side)]);
+                places.push([column.div_euclid(sides[0]), row.div_euclid(sides[1])]);
             }
         }
     }
     places.sort_unstable();
     places.dedup();
     progress.start("samples", places.len() as u64);
-    let mut sample = Sample { amplitude: 0.0, clipped: 0.0, most_points: 0, work: Work::default(), segments: 0 };
+    let mut sample = Sample {
+        amplitude: 0.0,
+        clipped: 0.0,
+        most_points: 0,
+        work: Work::default(),
+        whole: Work::default(),
+        segments: 0,
+    };
+    let mut busiest = None;
     let mut samples: Vec<f32> = Vec::new();
     for segment in places {
         progress.check()?;
-        let patch = |index: i64, bounds: [i64; 2]| {
+        let patch = |index: i64, side: i64, bounds: [i64; 2]| {
             let from = (index * side + (side - PATCH.min(side)) / 2).max(bounds[0]);
             [from, (from + PATCH.min(side)).min(bounds[1]).max(from)]
         };
-        let rect = Rect { x: patch(segment[0], area.x), y: patch(segment[1], area.y) };
+        let rect = Rect { x: patch(segment[0], sides[0], area.x), y: patch(segment[1], sides[1], area.y) };
         progress.advance(1);
         if rect.area() == 0 {
             continue;
         }
         let (field, work) = maker.field(&rect, &[Piece { segment, rect }], progress)?;
-        sample.most_points = sample.most_points.max(work.points);
+        if work.points > sample.most_points {
+            (sample.most_points, busiest) = (work.points, Some(segment));
+        }
         sample.work += work;
         samples.extend(field.iter().map(|u: &Complex32| u.norm()));
     }
@@ -123,6 +136,17 @@ pub fn sample(maker: &Maker, progress: &Progress) -> Result<Sample> {
             "none is seen from the plate within the {x:.2} deg × {y:.2} deg that it diffracts; move the scene or the viewer"
         );
         return Err(Error::parameter("points", what));
+    }
+    if let Some(segment) = busiest {
+        let span = |index: i64, side: i64, bounds: [i64; 2]| {
+            [(index * side).max(bounds[0]), ((index + 1) * side).min(bounds[1])]
+        };
+        let rect = Rect { x: span(segment[0], sides[0], area.x), y: span(segment[1], sides[1], area.y) };
+        let (field, work) = maker.field(&rect, &[Piece { segment, rect }], progress)?;
+        sample.whole = work;
+        let begin = Instant::now();
+        maker.levels(&field, &rect, 1.0);
+        sample.whole.fringe_seconds = begin.elapsed().as_secs_f64();
     }
     let amplitude = amplitude_at(&samples, plate.percentile);
     // Four digits, so that the manifest's decimals are the very number that is used.
@@ -135,8 +159,9 @@ pub fn sample(maker: &Maker, progress: &Progress) -> Result<Sample> {
     sample.clipped = samples.iter().filter(|a| **a > amplitude).count() as f64 / samples.len() as f64;
     // Tiles need not begin where segments do; then a segment is looked from in each tile that it lies in.
     let [tiles_x, tiles_y] = tile_counts(plate);
-    let per_tile = plate.tile.div_ceil(plate.segment) + u64::from(!plate.tile.is_multiple_of(plate.segment));
-    sample.segments = tiles_x * tiles_y * per_tile * per_tile;
+    let per_tile = |side: u64| plate.tile.div_ceil(side) + u64::from(!plate.tile.is_multiple_of(side));
+    let [wide, tall] = plate.segment_size();
+    sample.segments = tiles_x * tiles_y * per_tile(wide) * per_tile(tall);
     Ok(sample)
 }
 
@@ -146,22 +171,26 @@ pub fn plan(maker: &Maker, sample: &Sample) -> Plan {
     let Band { divisor, angle, .. } = maker.band;
     let pixels = plate.width as f64 * plate.height as f64;
     let work = &sample.work;
-    let per_pixel = (work.field_seconds + work.fringe_seconds) / work.pixels as f64;
-    let per_segment = work.points_seconds / work.segments as f64;
+    // Pairs are those of all samples, their speed that of a whole segment, which is also the last one: caches are warm.
+    let whole = &sample.whole;
+    let share = |a: f64, b: f64| if b > 0.0 { a / b } else { 0.0 };
+    let pairs = share(work.pairs, work.pixels as f64);
+    let per_pixel = pairs * share(whole.field_seconds, whole.pairs);
+    let points = share(work.points as f64, work.segments as f64);
+    let per_segment = points * share(whole.points_seconds, whole.points as f64);
     let halo = if plate.bits == 1 && plate.binarisation == Binarisation::Diffusion {
         (1.0 + 48.0 / plate.tile as f64) * (1.0 + 24.0 / plate.tile as f64)
     } else {
         1.0
     };
-    // The fringe itself: a reference wave and a level for each pixel.
-    const FRINGE: f64 = 4e-8;
-    let seconds = pixels * halo * (per_pixel + FRINGE) + per_segment * sample.segments as f64;
+    let fringe = share(whole.fringe_seconds, whole.pixels as f64);
+    let seconds = pixels * halo * (per_pixel + fringe) + per_segment * sample.segments as f64;
     let layout = Layout::new(plate);
     let side = plate.tile + 48;
     let segment = (plate.segment / u64::from(divisor[0])) * (plate.segment / u64::from(divisor[1]));
     let memory = side * side * 12 + plate.tile * plate.tile * 3 + segment * 8 + sample.most_points * 400 + (64 << 20);
     let rays = match maker.source {
-        Source::Cloud(_) => 0,
+        Source::Cloud(_) | Source::ColorCloud(_) => 0,
         Source::Scene(_) => {
             (work.points as f64 / work.segments as f64 * sample.segments as f64) as u64 * u64::from(plate.rays).pow(2)
         }
@@ -174,7 +203,7 @@ pub fn plan(maker: &Maker, sample: &Sample) -> Plan {
         segments: sample.segments,
         points: [work.points / work.segments.max(1), sample.most_points],
         rays,
-        pairs: work.pairs / work.pixels as f64 * pixels * halo,
+        pairs: pairs * pixels * halo,
         object_angle: angle,
         diffraction_angle: [sine(plate.pitch_x), sine(plate.pitch_y)],
         reference: plate.reference.frequencies(plate),
@@ -196,12 +225,7 @@ fn warnings(maker: &Maker, plan: &Plan) -> Vec<String> {
     let mut out = Vec::new();
     let mm = |metres: f64| format!("{:.3} mm", metres * 1e3);
     let degrees = |angle: f64| format!("{:.2} deg", angle.to_degrees());
-    let depths = match maker.source {
-        Source::Scene(views) => views.depths(),
-        Source::Cloud(points) => points
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |d, p| [d[0].min(p.position.z), d[1].max(p.position.z)]),
-    };
+    let depths = maker.source.depths();
     for (axis, name) in ["x", "y"].into_iter().enumerate() {
         // From the viewer's place the plate's edge is seen at an angle; what is sent there must reach it.
         let edge = (0.5 * plan.extent[axis] / plate.viewer).atan();
@@ -231,8 +255,24 @@ fn warnings(maker: &Maker, plan: &Plan) -> Vec<String> {
     if plate.bits == 1 && plate.quantity == Quantity::Phase {
         out.push("a phase of two levels has a conjugate image as bright as the object".into());
     }
-    if let Source::Cloud(_) = maker.source {
+    if let Source::Cloud(_) | Source::ColorCloud(_) = maker.source {
         out.push("points are the same from everywhere: nothing hides anything; give a scene for true views".into());
+    }
+    if let Some(slit) = &plate.slit {
+        let sine = plan.reference[1][1].abs().max(plan.reference[1][0].abs())
+            * plate.wavelengths().iter().copied().fold(f64::INFINITY, f64::min);
+        let (apart, lit) = (
+            slit.separation(plate, sine),
+            slit.height + plate.wavelength * plate.viewer / (slit.strip as f64 * plate.pitch_y),
+        );
+        if apart < lit {
+            out.push(format!(
+                "a strip lit with the next colour sends its light {} beside the slit, which is lit over {}: colours mix; \
+                 steepen the reference along y, or make the slit lower or the strips higher",
+                mm(apart),
+                mm(lit)
+            ));
+        }
     }
     if plate.pitch_x != plate.pitch_y {
         out.push("pixels are not square; check that the printer's are the same".into());

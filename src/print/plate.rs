@@ -1,7 +1,9 @@
 //! The description of a plate: a TOML file of `calib/`, its keys, their units and their domains.
 
 use super::reference::{Reference, Side};
+use super::slit::Slit;
 use crate::error::{Error, Result};
+use crate::points::colour::Lasers;
 use crate::units;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
@@ -89,6 +91,9 @@ pub struct Plate {
     pub tile: u64,
     /// Side of a segment: what sees the scene from one place [px].
     pub segment: u64,
+    /// The slit through which the plate is seen, where it has parallax from left to right only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slit: Option<Slit>,
     /// Distance of the viewer's eye in front of the plate [m].
     pub viewer: f64,
     /// Angle that the viewer's eye separates [rad].
@@ -142,6 +147,7 @@ struct PlateFile {
     #[serde(default = "one")]
     seed: u64,
     reference: Option<ReferenceFile>,
+    slit: Option<SlitFile>,
     scene: SceneFile,
 }
 
@@ -167,6 +173,15 @@ struct SceneFile {
     resolution: Option<String>,
     rays: Option<u32>,
     object_angle: Option<[String; 2]>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SlitFile {
+    height: String,
+    y: Option<String>,
+    strip: Option<u64>,
+    wavelengths: Option<Vec<String>>,
 }
 
 /// Turns a reader's error into one about the key and the file.
@@ -296,11 +311,39 @@ impl Plate {
             }
         };
         let scene = &file.scene;
+        let wavelength = at.read("wavelength", &file.wavelength, units::positive_length)?;
+        let viewer = at.read("scene.viewer", &scene.viewer, units::positive_length)?;
         let resolution = scene.resolution.as_deref().unwrap_or("0.016666666666666666deg");
         let resolution = at.angle("scene.resolution", resolution)?;
         if resolution <= 0.0 {
             return at.refuse("scene.resolution must be greater than zero");
         }
+        let slit = match &file.slit {
+            None => None,
+            Some(slit) => {
+                let as_fine_as_the_eye = (viewer * resolution.tan() / pitch_y).clamp(16.0, tile as f64) as u64;
+                let strip = slit.strip.unwrap_or(1 << as_fine_as_the_eye.ilog2());
+                if !(8..=tile).contains(&strip) {
+                    return at.refuse(format!("slit.strip = {strip} must be 8 to the tile's {tile}"));
+                }
+                let wavelengths = match &slit.wavelengths {
+                    None => vec![wavelength],
+                    Some(texts) => texts
+                        .iter()
+                        .map(|text| at.read("slit.wavelengths", text, units::positive_length))
+                        .collect::<Result<Vec<_>>>()?,
+                };
+                if !matches!(wavelengths.len(), 1 | 3) || wavelengths[0] != wavelength {
+                    return at.refuse("slit.wavelengths are three, the plate's own wavelength first");
+                }
+                if let [a, b, c] = wavelengths[..] {
+                    Lasers::new([a, b, c]).map_err(|e| Error::calibration(source, format!("slit: {e}")))?;
+                }
+                let y = slit.y.as_deref().map_or(Ok(0.0), |text| at.read("slit.y", text, units::length))?;
+                let height = at.read("slit.height", &slit.height, units::positive_length)?;
+                Some(Slit { y, height, strip, wavelengths })
+            }
+        };
         let object_angle = match &scene.object_angle {
             None => None,
             Some([x, y]) => {
@@ -320,7 +363,7 @@ impl Plate {
             height,
             pitch_x,
             pitch_y,
-            wavelength: at.read("wavelength", &file.wavelength, units::positive_length)?,
+            wavelength,
             reference,
             quantity: file.quantity,
             bits: file.bits,
@@ -336,7 +379,8 @@ impl Plate {
             marks: file.marks,
             tile,
             segment,
-            viewer: at.read("scene.viewer", &scene.viewer, units::positive_length)?,
+            slit,
+            viewer,
             resolution,
             rays: match scene.rays.unwrap_or(2) {
                 rays @ 1..=16 => rays,
@@ -353,6 +397,18 @@ impl Plate {
     /// Full width and height [m].
     pub fn extent(&self) -> [f64; 2] {
         [self.width as f64 * self.pitch_x, self.height as f64 * self.pitch_y]
+    }
+    /// Columns and rows of a segment [px]: square ones, or strips.
+    pub fn segment_size(&self) -> [u64; 2] {
+        [self.segment, self.slit.as_ref().map_or(self.segment, |slit| slit.strip)]
+    }
+    /// The wavelengths that light the finished plate [m].
+    pub fn wavelengths(&self) -> &[f64] {
+        self.slit.as_ref().map_or(std::slice::from_ref(&self.wavelength), |slit| &slit.wavelengths)
+    }
+    /// The wavelength that a row is made for [m].
+    pub fn wavelength_of(&self, row: i64) -> f64 {
+        self.slit.as_ref().map_or(self.wavelength, |slit| slit.wavelength_of(row))
     }
     /// Position of a column, which may lie outside of the plate [m].
     pub fn x(&self, column: i64) -> f64 {

@@ -34,6 +34,8 @@ pub struct PreviewSettings {
     pub size: (usize, usize),
     /// First column and row of the part that is looked at, and its size; the whole plate where `None`.
     pub part: Option<[u64; 4]>,
+    /// Wavelength of the lamp [m]; the plate's own where `None`. Another one shows what white light would do.
+    pub wavelength: Option<f64>,
     /// Memory that it may take [bytes].
     pub memory: u64,
 }
@@ -126,6 +128,10 @@ pub fn preview(folder: &Path, settings: &PreviewSettings, progress: &Progress) -
     if !(settings.pupil.is_finite() && settings.pupil > 0.0) {
         return Err(Error::parameter("pupil", format!("{} m must be greater than zero", settings.pupil)));
     }
+    let wavelength = settings.wavelength.unwrap_or(plate.wavelength);
+    if !(1e-8..1e-4).contains(&wavelength) {
+        return Err(Error::parameter("wavelength", format!("{wavelength} m must lie between 10 nm and 100 um")));
+    }
     let part = part_of(&plate, settings.part)?;
     let edges = [
         [plate.x(part.x[0]) - 0.5 * plate.pitch_x, plate.x(part.x[1] - 1) + 0.5 * plate.pitch_x],
@@ -135,7 +141,7 @@ pub fn preview(folder: &Path, settings: &PreviewSettings, progress: &Progress) -
     let pitch = [plate.pitch_x, plate.pitch_y];
     let (mut carrier, mut factor) = ([0.0; 2], [1; 2]);
     for axis in 0..2 {
-        let [low, high] = towards(edges, pupil, ez, plate.wavelength, axis);
+        let [low, high] = towards(edges, pupil, ez, wavelength, axis);
         carrier[axis] = 0.5 * (low + high);
         factor[axis] = ((USABLE / (pitch[axis] * (high - low))).floor() as usize).clamp(1, 64);
     }
@@ -167,10 +173,10 @@ pub fn preview(folder: &Path, settings: &PreviewSettings, progress: &Progress) -
         &part,
         [Thinning::new(factor[0]), Thinning::new(factor[1])],
         kept,
-        carrier,
+        (wavelength, carrier),
         progress,
     )?;
-    let wave = Wave { wavelength: plate.wavelength, carrier };
+    let wave = Wave { wavelength, carrier };
     let pupil_grid = Grid::new(pupil_size[0], pupil_size[1], pitch[0], pitch[1])?.centered_at([ex, ey]);
     progress.start("to the pupil", 0);
     let mut at_pupil = wave.carried(thinned, &grid, &pupil_grid, ez, progress)?;
@@ -211,7 +217,7 @@ fn thin(
     part: &Rect,
     [across, down]: [Thinning; 2],
     kept: [usize; 2],
-    carrier: [f64; 2],
+    (wavelength, carrier): (f64, [f64; 2]),
     progress: &Progress,
 ) -> Result<Vec<Complex32>> {
     let mut out = vec![Complex32::default(); kept[0] * kept[1]];
@@ -262,7 +268,7 @@ fn thin(
             || (Vec::new(), Vec::new()),
             |(reference, lit), (i, (line, levels))| {
                 let row = rect.y[0] + i as i64;
-                plate.reference.row(plate, row, rect.x[0]..rect.x[1], reference);
+                plate.reference.row(plate, wavelength, row, rect.x[0]..rect.x[1], reference);
                 let turn = turned(-carrier[1] * plate.y(row));
                 lit.clear();
                 lit.extend(

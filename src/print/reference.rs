@@ -48,18 +48,24 @@ pub enum Reference {
 const NARROWEST: f64 = 1.0 / 16.0;
 
 impl Reference {
-    /// Lowest and highest spatial frequency along x and along y over the plate [cycles/m].
+    /// Lowest and highest spatial frequency along x and along y over the plate, in all its wavelengths [cycles/m].
     pub fn frequencies(&self, plate: &Plate) -> [[f64; 2]; 2] {
+        let mut all = plate.wavelengths().iter().map(|&wavelength| self.frequencies_at(plate, wavelength));
+        let first = all.next().unwrap_or_default();
+        all.fold(first, |ranges, more| [0, 1].map(|i| [ranges[i][0].min(more[i][0]), ranges[i][1].max(more[i][1])]))
+    }
+
+    fn frequencies_at(&self, plate: &Plate, wavelength: f64) -> [[f64; 2]; 2] {
         match *self {
             Self::None => [[0.0; 2]; 2],
-            Self::Plane { angle, .. } => angle.map(|a| [a.sin() / plate.wavelength; 2]),
+            Self::Plane { angle, .. } => angle.map(|a| [a.sin() / wavelength; 2]),
             Self::Point { position: [px, py, pz] } => {
                 let half = plate.extent().map(|e| 0.5 * e);
                 let nearest = |p: f64, half: f64| (p.abs() - half).max(0.0);
                 let farthest = |p: f64, half: f64| p.abs() + half;
                 // Along an axis the frequency is monotonic; its ends lie where the other axis is nearest or farthest.
                 let ends = |p: f64, half: f64, other: [f64; 2]| {
-                    let at = |d: f64| other.map(|o| d / (d * d + o * o + pz * pz).sqrt() / plate.wavelength);
+                    let at = |d: f64| other.map(|o| d / (d * d + o * o + pz * pz).sqrt() / wavelength);
                     let all = [at(-half - p), at(half - p)].concat();
                     [
                         all.iter().copied().fold(f64::INFINITY, f64::min),
@@ -72,8 +78,15 @@ impl Reference {
         }
     }
 
-    /// The wave at columns `columns` of a row, unit amplitude.
-    pub fn row(&self, plate: &Plate, row: i64, columns: std::ops::Range<i64>, out: &mut Vec<Complex32>) {
+    /// The wave of a wavelength [m] at columns `columns` of a row, unit amplitude.
+    pub fn row(
+        &self,
+        plate: &Plate,
+        wavelength: f64,
+        row: i64,
+        columns: std::ops::Range<i64>,
+        out: &mut Vec<Complex32>,
+    ) {
         out.clear();
         let y = plate.y(row);
         let narrow = |turns: f64| {
@@ -83,14 +96,14 @@ impl Reference {
         match *self {
             Self::None => out.extend(columns.map(|_| Complex32::new(1.0, 0.0))),
             Self::Plane { angle, .. } => {
-                let [fx, fy] = angle.map(|a| a.sin() / plate.wavelength);
+                let [fx, fy] = angle.map(|a| a.sin() / wavelength);
                 out.extend(columns.map(|column| narrow(fx * plate.x(column) + fy * y)));
             }
             Self::Point { position: [px, py, pz] } => {
                 let other = (y - py) * (y - py) + pz * pz;
                 let turns = |column: i64| {
                     let dx = plate.x(column) - px;
-                    (dx * dx + other).sqrt() / plate.wavelength
+                    (dx * dx + other).sqrt() / wavelength
                 };
                 out.extend(columns.map(|column| narrow(turns(column))));
             }
@@ -120,8 +133,9 @@ impl Band {
         let pitch = [plate.pitch_x, plate.pitch_y];
         let ranges = plate.reference.frequencies(plate);
         let highest = ranges.map(|[low, high]| low.abs().max(high.abs()));
-        if highest[0].hypot(highest[1]) * plate.wavelength >= 1.0 && plate.reference != Reference::None {
-            let what = format!("{highest:?} cycles/m is no wave of {} m that travels", plate.wavelength);
+        let shortest = plate.wavelengths().iter().copied().fold(f64::INFINITY, f64::min);
+        if highest[0].hypot(highest[1]) * shortest >= 1.0 && plate.reference != Reference::None {
+            let what = format!("{highest:?} cycles/m is no wave of {shortest} m that travels");
             return Err(Error::parameter("reference", what));
         }
         // What the reference leaves beside it below the limit.
@@ -129,7 +143,7 @@ impl Band {
         for axis in 0..2 {
             let least = NARROWEST * limit[axis];
             if room[axis] < least {
-                let most = ((limit[axis] - least) * plate.wavelength).min(1.0).asin().to_degrees();
+                let most = ((limit[axis] - least) * shortest).min(1.0).asin().to_degrees();
                 return Err(Error::Undersampled {
                     what: "reference wave and object",
                     frequency: highest[axis] + least,
@@ -160,8 +174,22 @@ impl Band {
             }
         }
         let mut divisor = [1; 2];
+        let to_slit = plate.slit.as_ref().map(|slit| slit.steepest(plate));
         for axis in 0..2 {
-            let asked = plate.object_angle.map_or(f64::INFINITY, |angle| angle[axis].sin() / plate.wavelength);
+            let mut asked = plate.object_angle.map_or(f64::INFINITY, |angle| angle[axis].sin() / shortest);
+            if let (1, Some(sine)) = (axis, to_slit) {
+                let needed = sine / shortest;
+                if needed > room[1] || needed > asked {
+                    let what = format!(
+                        "light from the plate's edge to the slit takes {:.2} deg, reference and pitch leave it {:.2} deg; \
+                         steepen the reference, move the slit away, or make the plate lower",
+                        sine.asin().to_degrees(),
+                        (room[1].min(asked) * shortest).min(1.0).asin().to_degrees()
+                    );
+                    return Err(Error::parameter("slit", what));
+                }
+                asked = needed;
+            }
             // The band's outermost twentieth holds 4e-4 of the light: so much of it may lie on the zero order.
             divisor[axis] = (0.95 * limit[axis] / room[axis].min(asked)).ceil().max(1.0) as u32;
             if divisor[axis] > 64 {

@@ -9,10 +9,11 @@ use super::views::{Source, Views};
 use crate::error::{Error, Result};
 use crate::hologram::InstructionSet;
 use crate::illumination::{Illumination, IlluminationSettings};
+use crate::points::colour::Lasers;
 use crate::points::trace::{self, TraceSettings};
-use crate::points::{Channel, ply};
+use crate::points::{Channel, PointSource, ply};
 use crate::progress::Progress;
-use crate::reconstruction::Picture;
+use crate::reconstruction::ColorPicture;
 use crate::scene::{SceneBvh, gltf};
 use glam::DVec3;
 use serde_json::{Value, json};
@@ -128,11 +129,19 @@ impl Task {
                 let what = "its points stand in the scene's own metres; write them with --frame hologram";
                 return Err(Error::input(&self.input, what));
             }
-            let points = read.cloud.channel(Channel::Luminance);
-            if points.iter().all(|p| p.amplitude == 0.0) {
+            let source = match plate.wavelengths() {
+                &[a, b, c] => Source::ColorCloud(Lasers::new([a, b, c])?.points(&read.cloud).0),
+                _ => Source::Cloud(read.cloud.channel(Channel::Luminance)),
+            };
+            let shine = |points: &[PointSource]| points.iter().any(|p| p.amplitude > 0.0);
+            let shines = match &source {
+                Source::Cloud(points) => shine(points),
+                Source::ColorCloud(points) => points.iter().any(|p| shine(p)),
+                Source::Scene(_) => true,
+            };
+            if !shines {
                 return Err(Error::input(&self.input, "has no points that shine"));
             }
-            let source = Source::Cloud(points);
             return work(&Maker { plate, band, source: &source, instruction_set });
         }
         self.lit(plate, white, progress, |views| {
@@ -184,7 +193,7 @@ impl Task {
         focus: f64,
         seen: &Preview,
         progress: &Progress,
-    ) -> Result<(Picture, f32)> {
+    ) -> Result<(ColorPicture, f32)> {
         if self.is_cloud() {
             return Err(Error::parameter("traced", "points cannot be traced; give the scene"));
         }
@@ -219,7 +228,7 @@ impl Task {
                 ..TraceSettings::default()
             };
             let traced = trace::trace(views.light(), &camera, &settings, progress)?;
-            let (mut sums, mut counts) = (vec![0.0f64; width * height], vec![0u32; width * height]);
+            let (mut sums, mut counts) = (vec![[0.0f64; 3]; width * height], vec![0u32; width * height]);
             let step_x = 2.0 * tall * distance / rays[1];
             for (index, rgb) in traced.picture.iter().enumerate() {
                 let (column, row) = (index % columns as usize, index / columns as usize);
@@ -228,12 +237,13 @@ impl Task {
                 let (column, row) = ((x / cell[0]).floor(), (y / cell[1]).floor());
                 if (0.0..width as f64).contains(&column) && (0.0..height as f64).contains(&row) {
                     let at = row as usize * width + column as usize;
-                    sums[at] += f64::from(Channel::Luminance.of(*rgb));
+                    sums[at].iter_mut().zip(rgb).for_each(|(sum, v)| *sum += f64::from(*v));
                     counts[at] += 1;
                 }
             }
-            let values = sums.iter().zip(&counts).map(|(sum, n)| (sum / f64::from((*n).max(1))) as f32).collect();
-            Ok((Picture { width, height, values }, views.white()))
+            let mean = |(sum, n): (&[f64; 3], &u32)| sum.map(|sum| (sum / f64::from((*n).max(1))) as f32);
+            let rgb = sums.iter().zip(&counts).map(mean).collect();
+            Ok((ColorPicture { width, height, rgb }, views.white()))
         })
     }
 }

@@ -34,6 +34,8 @@ use glam::{DMat3, DMat4, DVec3};
 pub enum Source<'a> {
     /// Points that stand in the hologram frame, the same for all segments.
     Cloud(Vec<PointSource>),
+    /// The same for three lasers, red, green, blue.
+    ColorCloud([Vec<PointSource>; 3]),
     /// A lit scene.
     Scene(Box<Views<'a>>),
 }
@@ -124,6 +126,10 @@ impl<'a> Views<'a> {
     pub fn world_from_hologram(&self) -> DMat4 {
         self.world_from_hologram
     }
+    /// Hologram frame from world frame.
+    pub fn hologram_from_world(&self) -> DMat4 {
+        self.hologram_from_world
+    }
     /// The lit scene.
     pub fn light(&self) -> &'a Illumination<'a> {
         self.light
@@ -131,15 +137,55 @@ impl<'a> Views<'a> {
 
     /// A camera at a place of the hologram frame that looks straight at the plate, along −z.
     pub fn camera(&self, eye: DVec3, half_tangent: f64) -> Camera {
+        self.inclined(eye, [0.0, 1.0], half_tangent, 0.0)
+    }
+
+    /// One that looks along −(0, sin β, cos β), and begins to see so far before its place [m of the hologram frame].
+    pub(super) fn inclined(&self, eye: DVec3, [sine, cosine]: [f64; 2], half_tangent: f64, before: f64) -> Camera {
         let linear = DMat3::from_mat4(self.world_from_hologram);
         let axes = DMat3::from_cols(linear.x_axis.normalize(), linear.y_axis.normalize(), linear.z_axis.normalize());
+        let tilt = DMat3::from_cols(DVec3::X, DVec3::new(0.0, cosine, -sine), DVec3::new(0.0, sine, cosine));
         let position = self.world_from_hologram.transform_point3(eye);
         Camera {
             name: "segment".into(),
-            world_from_camera: DMat4::from_mat3_translation(axes, position),
+            world_from_camera: DMat4::from_mat3_translation(axes * tilt, position),
             projection: Projection::Perspective { yfov: 2.0 * half_tangent.atan(), aspect: None },
-            before: 0.0,
+            before: before * linear.z_axis.length(),
         }
+    }
+
+    /// Rays within ±tangent across and down, as close as the eye separates where they are `deepest` long [m]; `stream`
+    /// names them.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for more than can be cast.
+    pub(super) fn rays(
+        &self,
+        plate: &Plate,
+        tangent: [f64; 2],
+        deepest: f64,
+        [column, row, front]: [i64; 3],
+    ) -> Result<TraceSettings> {
+        let count = |tangent: f64| (2.0 * tangent * deepest / self.spot * f64::from(plate.rays)).ceil().max(1.0);
+        let [width, height] = tangent.map(count);
+        if width * height > MOST_RAYS {
+            let what = format!(
+                "{width}×{height} rays of one segment: the scene lies {deepest:.3} m away and the eye separates {:.2e} m there; \
+                 lower scene.rays or raise scene.resolution",
+                self.spot
+            );
+            return Err(Error::parameter("scene.rays", what));
+        }
+        let stream = (column as u64) << 32 ^ (row as u64) << 1 ^ front as u64;
+        Ok(TraceSettings {
+            width: width as u32,
+            height: height as u32,
+            bounces: self.bounces,
+            edge_rays: 1,
+            jitter: true,
+            seed: Random::new(plate.seed ^ 0x7e57, stream).bits(),
+            ..TraceSettings::default()
+        })
     }
 
     /// Points that a segment sees.
@@ -172,34 +218,17 @@ impl<'a> Views<'a> {
         let [x, y] = segment_center(plate, segment);
         let wide = tangent[0].max(half[0] / beyond);
         let tall = tangent[1].max(half[1] / beyond);
-        let mut camera = self.camera(DVec3::new(x, y, apex), tall);
-        if self.depths[1] > 0.0 {
+        let before = if self.depths[1] > 0.0 {
             // Lines of sight begin before whatever stands in front of the plate.
-            let world = DMat3::from_mat4(self.world_from_hologram).z_axis.length();
             let slant = (1.0 + wide * wide + tall * tall).sqrt();
-            camera.before = ((self.depths[1] - apex).max(0.0) + self.spot) * slant * world;
-        }
-        let deepest = (apex - self.depths[0]).abs().max((self.depths[1] - apex).abs());
-        let count = |tangent: f64| (2.0 * tangent * deepest / self.spot * f64::from(plate.rays)).ceil().max(1.0);
-        let [width, height] = [count(wide), count(tall)];
-        if width * height > MOST_RAYS {
-            let what = format!(
-                "{width}×{height} rays of one segment: the scene lies {deepest:.3} m away and the eye separates {:.2e} m there; \
-                 lower scene.rays or raise scene.resolution",
-                self.spot
-            );
-            return Err(Error::parameter("scene.rays", what));
-        }
-        let stream = (segment[0] as u64) << 32 ^ (segment[1] as u64) << 1 ^ u64::from(front);
-        let settings = TraceSettings {
-            width: width as u32,
-            height: height as u32,
-            bounces: self.bounces,
-            edge_rays: 1,
-            jitter: true,
-            seed: Random::new(plate.seed ^ 0x7e57, stream).bits(),
-            ..TraceSettings::default()
+            ((self.depths[1] - apex).max(0.0) + self.spot) * slant
+        } else {
+            0.0
         };
+        let camera = self.inclined(DVec3::new(x, y, apex), [0.0, 1.0], tall, before);
+        let deepest = (apex - self.depths[0]).abs().max((self.depths[1] - apex).abs());
+        let settings = self.rays(plate, [wide, tall], deepest, [segment[0], segment[1], i64::from(front)])?;
+        let height = f64::from(settings.height);
         let traced = trace::trace(self.light, &camera, &settings, progress)?;
         let mut seen: Vec<WorldPoint> =
             traced.points.iter().map(|p| WorldPoint { position: p.position, radiance: p.radiance }).collect();
@@ -255,6 +284,18 @@ impl<'a> Views<'a> {
 }
 
 impl Source<'_> {
+    /// Lowest and highest z of what shines [m]; of a scene, of all that is in it.
+    pub fn depths(&self) -> [f64; 2] {
+        let of = |points: &mut dyn Iterator<Item = &PointSource>| {
+            points.fold([f64::INFINITY, f64::NEG_INFINITY], |d, p| [d[0].min(p.position.z), d[1].max(p.position.z)])
+        };
+        match self {
+            Self::Scene(views) => views.depths(),
+            Self::Cloud(points) => of(&mut points.iter()),
+            Self::ColorCloud(points) => of(&mut points.iter().flatten()),
+        }
+    }
+
     /// Points whose light a segment needs.
     ///
     /// # Errors
@@ -268,7 +309,7 @@ impl Source<'_> {
     ) -> Result<Vec<PointSource>> {
         match self {
             Self::Scene(views) => views.points(plate, band, segment, progress),
-            Self::Cloud(points) => {
+            Self::Cloud(points) | Self::ColorCloud([points, ..]) => {
                 let center = segment_center(plate, segment);
                 let half = [plate.pitch_x, plate.pitch_y].map(|pitch| (0.5 * plate.segment as f64 + 64.0) * pitch);
                 // The taper's tail reaches a little beyond the band; the engines know how far exactly.
