@@ -225,6 +225,19 @@ fn report_plan(plan: &Plan, plate: &Plate, set: InstructionSet, free: Option<u64
         ),
     );
     report.add("segments", plan.segments, "");
+    if let Some(slit) = &plate.slit {
+        report.add_serialised(
+            "slit",
+            slit,
+            format!(
+                "slit         {} high at {}, parallax from left to right; strips of {} rows for {}",
+                show_length(slit.height),
+                show_length(plate.viewer),
+                slit.strip,
+                slit.wavelengths.iter().map(|w| show_length(*w)).collect::<Vec<_>>().join(", ")
+            ),
+        );
+    }
     report.add_serialised(
         "points",
         &plan.points,

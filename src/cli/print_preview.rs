@@ -115,6 +115,10 @@ pub(super) fn look(args: &PreviewArgs) -> Result<Report> {
     report.add("half", seen.half.to_array().to_vec(), "");
     report.add("passed", seen.passed, "");
     report.add("brightness", brightness, "");
+    if seen.dazzled {
+        report.warn(["the lamp's own light goes through the plate into this pupil; move the eye out of it"]);
+    }
+    report.add("dazzled", seen.dazzled, "");
     report.add("thinned", seen.thinned.to_vec(), "");
     report.add(
         "seconds",

@@ -24,6 +24,7 @@ mod shard;
 mod slit;
 #[cfg(test)]
 mod tests;
+mod thinning;
 mod tiff;
 mod views;
 mod zarr;

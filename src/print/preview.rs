@@ -9,16 +9,16 @@
 //! pupil, and carried back to the plane in focus.
 
 use super::export::Reader;
-use super::geometry::{Rect, tile_in_file, tile_on_plate};
-use super::plate::{Plate, Polarity, Quantity};
+use super::geometry::Rect;
+use super::plate::Plate;
+use super::thinning::{Thinning, USABLE, thin};
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Complex64, Fft2, Grid};
 use crate::progress::Progress;
 use crate::propagation::band;
 use crate::reconstruction::Picture;
 use glam::DVec2;
-use rayon::prelude::*;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use std::path::Path;
 
 /// From where the plate is looked at.
@@ -43,59 +43,20 @@ pub struct PreviewSettings {
 /// What is seen.
 #[derive(Clone, Debug)]
 pub struct Preview {
-    /// The picture on the plane in focus: linear intensity, row 0 on top.
+    /// The picture on the plane in focus: power in each cell for a reference of 1 W/m², row 0 on top.
     pub picture: Picture,
     /// Its middle (x, y) on that plane [m].
     pub center: [f64; 2],
     /// Its half width and half height [m].
     pub half: DVec2,
-    /// Every how many columns and rows of the plate one sample was kept.
+    /// Every how many columns and rows of the plate one sample was kept, where most were.
     pub thinned: [usize; 2],
-    /// Samples across and down of the transform to the pupil.
+    /// Samples across and down of the largest transform to the pupil.
     pub transform: [usize; 2],
     /// Share of the light that goes towards the pupil which passes it.
     pub passed: f64,
-}
-
-/// Half length of the thinning filter in kept samples.
-const TAPS: usize = 8;
-/// Share of the kept band that the filter passes evenly and free of aliases.
-const USABLE: f64 = 0.66;
-
-/// Thinning along one axis: samples `factor` apart, limited to their band.
-struct Thinning {
-    factor: usize,
-    /// Filter at offsets −taps … +taps pixels.
-    filter: Vec<f32>,
-    taps: i64,
-}
-
-impl Thinning {
-    /// A sinc with a cut at half the kept rate under a Blackman window: its edge is 5.5/(2·8·factor) cycles a pixel wide, so
-    /// that two thirds of the kept band are flat and free of aliases to 1e-3.
-    fn new(factor: usize) -> Self {
-        if factor == 1 {
-            return Self { factor, filter: vec![1.0], taps: 0 };
-        }
-        let taps = (TAPS * factor) as i64;
-        let value = |i: i64| {
-            let x = i as f64 / factor as f64;
-            let sinc = if i == 0 { 1.0 } else { (PI * x).sin() / (PI * x) };
-            let phase = PI * (1.0 + i as f64 / (taps as f64 + 1.0));
-            sinc * (0.42 - 0.5 * phase.cos() + 0.08 * (2.0 * phase).cos())
-        };
-        let values: Vec<f64> = (-taps..=taps).map(value).collect();
-        let sum: f64 = values.iter().sum();
-        Self { factor, filter: values.into_iter().map(|v| (v / sum) as f32).collect(), taps }
-    }
-    /// Kept samples whose filter touches the pixels of a range, counted from the part's first pixel.
-    fn touched(&self, range: [i64; 2], count: usize) -> std::ops::Range<usize> {
-        let factor = self.factor as i64;
-        let first = (range[0] - self.taps).div_euclid(factor).max(0);
-        let end = (range[1] - 1 + self.taps).div_euclid(factor) + 1;
-        let end = end.clamp(0, count as i64);
-        first.min(end) as usize..end as usize
-    }
+    /// The lamp's own light goes through the plate into the pupil.
+    pub dazzled: bool,
 }
 
 /// Lowest and highest spatial frequency along an axis of light from one rectangle to another at a distance.
@@ -112,13 +73,17 @@ fn towards(from: [[f64; 2]; 2], to: [[f64; 2]; 2], distance: f64, wavelength: f6
 
 /// Reconstructs what an eye sees of a part of a finished plate.
 ///
+/// What one transform cannot hold in the memory is looked at piece by piece: each piece of the picture with the light of
+/// its own place on the plate and of as much around it as the pupil blurs into it.
+///
 /// # Errors
-/// Those of a plate that is missing, incomplete or damaged; [`Error::Parameter`] for an eye that is not in front of plate and focus, and a part that is not
-/// on the plate; [`Error::Memory`] past the budget, with what would help; [`Error::Interrupted`].
+/// Those of a plate that is missing, incomplete or damaged; [`Error::Parameter`] for an eye that is not in front of plate
+/// and focus, and a part that is not on the plate; [`Error::Memory`] past the budget, with what would help;
+/// [`Error::Interrupted`].
 pub fn preview(folder: &Path, settings: &PreviewSettings, progress: &Progress) -> Result<Preview> {
     let mut reader = Reader::open(folder)?;
     let plate = reader.plate().clone();
-    let [ex, ey, ez] = settings.eye;
+    let [_, _, ez] = settings.eye;
     if !(settings.eye.iter().all(|c| c.is_finite()) && ez > 0.0) {
         return Err(Error::parameter("eye", format!("z = {ez} m: the eye must stand in front of the plate")));
     }
@@ -133,70 +98,183 @@ pub fn preview(folder: &Path, settings: &PreviewSettings, progress: &Progress) -
         return Err(Error::parameter("wavelength", format!("{wavelength} m must lie between 10 nm and 100 um")));
     }
     let part = part_of(&plate, settings.part)?;
-    let edges = [
-        [plate.x(part.x[0]) - 0.5 * plate.pitch_x, plate.x(part.x[1] - 1) + 0.5 * plate.pitch_x],
-        [plate.y(part.y[1] - 1) - 0.5 * plate.pitch_y, plate.y(part.y[0]) + 0.5 * plate.pitch_y],
-    ];
-    let pupil = [ex, ey].map(|e| [e - 0.5 * settings.pupil, e + 0.5 * settings.pupil]);
-    let pitch = [plate.pitch_x, plate.pitch_y];
-    let (mut carrier, mut factor) = ([0.0; 2], [1; 2]);
-    for axis in 0..2 {
-        let [low, high] = towards(edges, pupil, ez, wavelength, axis);
-        carrier[axis] = 0.5 * (low + high);
-        factor[axis] = ((USABLE / (pitch[axis] * (high - low))).floor() as usize).clamp(1, 64);
-    }
-    let kept = [part.width().div_ceil(factor[0]), part.height().div_ceil(factor[1])];
-    let pitch = [pitch[0] * factor[0] as f64, pitch[1] * factor[1] as f64];
-    let pupil_size = [0, 1].map(|axis| (settings.pupil / pitch[axis]).ceil() as usize + 2);
-    let far = (ez - settings.focus) / ez;
-    let half = DVec2::new(0.5 * (edges[0][1] - edges[0][0]) * far, 0.5 * (edges[1][1] - edges[1][0]) * far);
-    let window_size = [0, 1].map(|axis| (2.0 * half[axis] / pitch[axis]).ceil() as usize + 2);
-    let transform = [0, 1].map(|axis| kept[axis].max(window_size[axis]) + pupil_size[axis]);
-    let needed = 16 * (transform[0] as u64).saturating_mul(transform[1] as u64) + 8 * (kept[0] * kept[1]) as u64;
-    if needed > settings.memory {
-        return Err(Error::Memory {
-            what: "preview",
-            needed: needed.div_ceil(1 << 20),
-            budget: settings.memory >> 20,
-            hint: "look at a part of the plate (--part), or from farther away".into(),
-        });
-    }
-    let mut grid = Grid::new(kept[0], kept[1], pitch[0], pitch[1])?;
-    // Sample m stands on pixel m·factor of the part.
-    grid.center = [
-        plate.x(part.x[0]) + 0.5 * (kept[0] as f64 - 1.0) * pitch[0],
-        plate.y(part.y[0]) - 0.5 * (kept[1] as f64 - 1.0) * pitch[1],
-    ];
-    let thinned = thin(
-        &mut reader,
-        &plate,
-        &part,
-        [Thinning::new(factor[0]), Thinning::new(factor[1])],
-        kept,
-        (wavelength, carrier),
-        progress,
-    )?;
-    let wave = Wave { wavelength, carrier };
-    let pupil_grid = Grid::new(pupil_size[0], pupil_size[1], pitch[0], pitch[1])?.centered_at([ex, ey]);
-    progress.start("to the pupil", 0);
-    let mut at_pupil = wave.carried(thinned, &grid, &pupil_grid, ez, progress)?;
-    let energy = |field: &[Complex32]| field.iter().map(|u| f64::from(u.norm_sqr())).sum::<f64>();
-    let arriving = energy(&at_pupil);
-    for (index, u) in at_pupil.iter_mut().enumerate() {
-        let (x, y) = (pupil_grid.x(index % pupil_grid.width) - ex, pupil_grid.y(index / pupil_grid.width) - ey);
-        if x.hypot(y) > 0.5 * settings.pupil {
-            *u = Complex32::default();
+    let (width, height) = settings.size;
+    let eye = Eye { plate: &plate, settings, wavelength };
+    let mut pieces = 1;
+    let cuts = loop {
+        let cut = |range: [i64; 2], cells: usize| -> Vec<(std::ops::Range<usize>, [i64; 2])> {
+            let at = |cell: usize| range[0] + ((range[1] - range[0]) * cell as i64) / cells.max(1) as i64;
+            let of = |i: usize| i * cells / pieces..(i + 1) * cells / pieces;
+            (0..pieces).map(of).filter(|c| !c.is_empty()).map(|c| (c.clone(), [at(c.start), at(c.end)])).collect()
+        };
+        let (columns, rows) = (cut(part.x, width), cut(part.y, height));
+        let looks: Vec<_> = rows
+            .iter()
+            .flat_map(|(rows, y)| columns.iter().map(move |(columns, x)| (columns, rows, Rect { x: *x, y: *y })))
+            .map(|(columns, rows, shown)| (columns.clone(), rows.clone(), eye.look(&shown, &part)))
+            .collect();
+        let needed = looks.iter().map(|(_, _, look)| look.memory()).max().unwrap_or(0);
+        if needed <= settings.memory {
+            break looks;
         }
+        // Pieces that are no larger than what is blurred into them do not get smaller.
+        if pieces >= 64 || pieces >= width.min(height).max(1) {
+            return Err(Error::Memory {
+                what: "preview",
+                needed: needed.div_ceil(1 << 20),
+                budget: settings.memory >> 20,
+                hint: "look at a part of the plate (--part), or from farther away".into(),
+            });
+        }
+        pieces *= 2;
+    };
+    let whole = eye.look(&part, &part);
+    let mut picture = Picture { width, height, values: vec![0.0; width * height] };
+    let (mut passed, mut arriving) = (0.0, 0.0);
+    let (mut thinned, mut transform) = ([usize::MAX; 2], [0; 2]);
+    for (columns, rows, look) in cuts {
+        let (seen, energies) = eye.see(&mut reader, &look, (columns.len(), rows.len()), progress)?;
+        for (line, row) in seen.values.chunks_exact(columns.len()).zip(rows) {
+            picture.values[row * width..][columns.clone()].copy_from_slice(line);
+        }
+        (arriving, passed) = (arriving + energies[0], passed + energies[1]);
+        thinned = [0, 1].map(|axis| thinned[axis].min(look.factor[axis]));
+        transform = [0, 1].map(|axis| transform[axis].max(look.transform[axis]));
     }
-    let passed = if arriving > 0.0 { energy(&at_pupil) / arriving } else { 0.0 };
-    let middle = [0.5 * (edges[0][0] + edges[0][1]), 0.5 * (edges[1][0] + edges[1][1])];
-    let center = [ex + (middle[0] - ex) * far, ey + (middle[1] - ey) * far];
-    let window = Grid::new(window_size[0], window_size[1], pitch[0], pitch[1])?.centered_at(center);
-    progress.start("to the focus", 0);
-    let seen = wave.carried(at_pupil, &pupil_grid, &window, settings.focus - ez, progress)?;
-    let values: Vec<f32> = seen.iter().map(Complex32::norm_sqr).collect();
-    let picture = Picture::from_samples(&window, &values, half, settings.size.0, settings.size.1);
-    Ok(Preview { picture, center, half, thinned: factor, transform, passed })
+    let passed = if arriving > 0.0 { passed / arriving } else { 0.0 };
+    let dazzled = eye.dazzled(&part);
+    Ok(Preview { picture, center: whole.center, half: whole.half, thinned, transform, passed, dazzled })
+}
+
+/// Whoever looks, and at what.
+struct Eye<'a> {
+    plate: &'a Plate,
+    settings: &'a PreviewSettings,
+    wavelength: f64,
+}
+
+/// How one piece is looked at.
+struct Look {
+    /// What of the plate lights it.
+    lit: Rect,
+    /// Middle of the band that is kept [cycles/m].
+    carrier: [f64; 2],
+    /// Every how many pixels a sample is kept, how many are, and how far apart they are [m].
+    factor: [usize; 2],
+    kept: [usize; 2],
+    pitch: [f64; 2],
+    /// Samples of pupil, picture and transform.
+    pupil: [usize; 2],
+    window: [usize; 2],
+    transform: [usize; 2],
+    /// Middle and half size of the picture on the plane in focus [m].
+    center: [f64; 2],
+    half: DVec2,
+}
+
+impl Look {
+    /// Most memory that is held at once [bytes].
+    fn memory(&self) -> u64 {
+        let kept = (self.kept[0] * self.kept[1]) as u64;
+        16 * (self.transform[0] as u64).saturating_mul(self.transform[1] as u64) + 8 * kept
+    }
+}
+
+/// Edges of a rectangle of the plate along x and y [m].
+fn edges(plate: &Plate, rect: &Rect) -> [[f64; 2]; 2] {
+    let (dx, dy) = (0.5 * plate.pitch_x, 0.5 * plate.pitch_y);
+    [[plate.x(rect.x[0]) - dx, plate.x(rect.x[1] - 1) + dx], [plate.y(rect.y[1] - 1) - dy, plate.y(rect.y[0]) + dy]]
+}
+
+impl Eye<'_> {
+    /// Edges of the pupil along x and y [m].
+    fn opening(&self) -> [[f64; 2]; 2] {
+        let PreviewSettings { pupil, eye: [ex, ey, _], .. } = self.settings;
+        [ex, ey].map(|e| [e - 0.5 * pupil, e + 0.5 * pupil])
+    }
+
+    /// Whether some of the lamp's light goes through a part of the plate straight into the pupil.
+    fn dazzled(&self, part: &Rect) -> bool {
+        let lamp = self.plate.reference.frequencies_at(self.plate, self.wavelength);
+        (0..2).all(|axis| {
+            let ends = [edges(self.plate, part), self.opening()];
+            let [low, high] = towards(ends[0], ends[1], self.settings.eye[2], self.wavelength, axis);
+            lamp[axis][0] <= high && lamp[axis][1] >= low
+        })
+    }
+
+    /// What is needed to see `shown` of a part.
+    fn look(&self, shown: &Rect, part: &Rect) -> Look {
+        let (plate, PreviewSettings { pupil, focus, eye: [ex, ey, ez], .. }) = (self.plate, self.settings);
+        // Out of focus the plate's light is blurred over the pupil's image on it; and the pupil diffracts: nine tenths of
+        // a spot's light lie within two of its rings, the rest falls with the cube of the distance.
+        let pitches = [plate.pitch_x, plate.pitch_y];
+        let blur = 0.5 * pupil * focus.abs() / (ez - focus) + 12.0 * self.wavelength * ez / pupil;
+        let [across, down] = pitches.map(|pitch| (1.1 * blur / pitch).ceil() as i64);
+        let lit = Rect {
+            x: [(shown.x[0] - across).max(part.x[0]), (shown.x[1] + across).min(part.x[1])],
+            y: [(shown.y[0] - down).max(part.y[0]), (shown.y[1] + down).min(part.y[1])],
+        };
+        let opening = self.opening();
+        let (mut carrier, mut factor) = ([0.0; 2], [1; 2]);
+        for axis in 0..2 {
+            let [low, high] = towards(edges(plate, &lit), opening, *ez, self.wavelength, axis);
+            carrier[axis] = 0.5 * (low + high);
+            factor[axis] = ((USABLE / (pitches[axis] * (high - low))).floor() as usize).clamp(1, 64);
+        }
+        let kept = [lit.width().div_ceil(factor[0]), lit.height().div_ceil(factor[1])];
+        let pitch = [0, 1].map(|axis| pitches[axis] * factor[axis] as f64);
+        let pupil = pitch.map(|pitch| (pupil / pitch).ceil() as usize + 2);
+        let far = (ez - focus) / ez;
+        let [x, y] = edges(plate, shown);
+        let half = DVec2::new(0.5 * (x[1] - x[0]) * far, 0.5 * (y[1] - y[0]) * far);
+        let window = [0, 1].map(|axis| (2.0 * half[axis] / pitch[axis]).ceil() as usize + 2);
+        let transform = [0, 1].map(|axis| kept[axis].max(window[axis]) + pupil[axis]);
+        let middle = [0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1])];
+        let center = [ex + (middle[0] - ex) * far, ey + (middle[1] - ey) * far];
+        Look { lit, carrier, factor, kept, pitch, pupil, window, transform, center, half }
+    }
+
+    /// The picture, and the light that arrives at the pupil's plane and that passes it.
+    fn see(
+        &self,
+        reader: &mut Reader,
+        look: &Look,
+        size: (usize, usize),
+        progress: &Progress,
+    ) -> Result<(Picture, [f64; 2])> {
+        let (plate, PreviewSettings { pupil, focus, eye: [ex, ey, ez], .. }) = (self.plate, self.settings);
+        let [pitch_x, pitch_y] = look.pitch;
+        let mut grid = Grid::new(look.kept[0], look.kept[1], pitch_x, pitch_y)?;
+        // Sample m stands on pixel m·factor of what is lit.
+        grid.center = [
+            plate.x(look.lit.x[0]) + 0.5 * (look.kept[0] as f64 - 1.0) * pitch_x,
+            plate.y(look.lit.y[0]) - 0.5 * (look.kept[1] as f64 - 1.0) * pitch_y,
+        ];
+        let thinning = look.factor.map(Thinning::new);
+        let lamp = (self.wavelength, look.carrier);
+        let thinned = thin(reader, plate, &look.lit, thinning, look.kept, lamp, progress)?;
+        let wave = Wave { wavelength: self.wavelength, carrier: look.carrier };
+        let pupil_grid = Grid::new(look.pupil[0], look.pupil[1], pitch_x, pitch_y)?.centered_at([*ex, *ey]);
+        progress.start("to the pupil", 0);
+        let mut at_pupil = wave.carried(thinned, &grid, &pupil_grid, *ez, progress)?;
+        // Power, so that pieces and colours of other samplings compare.
+        let area = pitch_x * pitch_y;
+        let energy = |field: &[Complex32]| area * field.iter().map(|u| f64::from(u.norm_sqr())).sum::<f64>();
+        let arriving = energy(&at_pupil);
+        for (index, u) in at_pupil.iter_mut().enumerate() {
+            let (x, y) = (pupil_grid.x(index % pupil_grid.width) - ex, pupil_grid.y(index / pupil_grid.width) - ey);
+            if x.hypot(y) > 0.5 * pupil {
+                *u = Complex32::default();
+            }
+        }
+        let passed = energy(&at_pupil);
+        let window = Grid::new(look.window[0], look.window[1], pitch_x, pitch_y)?.centered_at(look.center);
+        progress.start("to the focus", 0);
+        let seen = wave.carried(at_pupil, &pupil_grid, &window, focus - ez, progress)?;
+        let values: Vec<f32> = seen.iter().map(|u| area as f32 * u.norm_sqr()).collect();
+        Ok((Picture::from_samples(&window, &values, look.half, size.0, size.1), [arriving, passed]))
+    }
 }
 
 fn part_of(plate: &Plate, part: Option<[u64; 4]>) -> Result<Rect> {
@@ -208,106 +286,6 @@ fn part_of(plate: &Plate, part: Option<[u64; 4]>) -> Result<Rect> {
     }
     let span = |from: u64, size: u64| [from as i64, (from + size) as i64];
     Ok(Rect { x: span(column, width), y: span(row, height) })
-}
-
-/// Reads the part's tiles, lets the reference shine on them, and keeps the band about the carrier.
-fn thin(
-    reader: &mut Reader,
-    plate: &Plate,
-    part: &Rect,
-    [across, down]: [Thinning; 2],
-    kept: [usize; 2],
-    (wavelength, carrier): (f64, [f64; 2]),
-    progress: &Progress,
-) -> Result<Vec<Complex32>> {
-    let mut out = vec![Complex32::default(); kept[0] * kept[1]];
-    let highest = if plate.bits == 1 { 1.0 } else { 255.0f32 };
-    let phasors: Vec<Complex32> = (0..=highest as usize)
-        .map(|level| {
-            let level = level as f32 / highest;
-            let t = if plate.polarity == Polarity::Negative { 1.0 - level } else { level };
-            match plate.quantity {
-                Quantity::Phase => {
-                    let wave = Complex64::cis(TAU * (f64::from(t) - 0.5));
-                    Complex32::new(wave.re as f32, wave.im as f32)
-                }
-                Quantity::Bipolar | Quantity::Intensity => Complex32::new(t, 0.0),
-            }
-        })
-        .collect();
-    let tiles: Vec<u64> =
-        (0..reader.tiles()).filter(|&index| tile_on_plate(plate, index).and(part).area() > 0).collect();
-    progress.start("light on the fringes", tiles.len() as u64);
-    let turned = |turns: f64| {
-        let wave = Complex64::cis(TAU * (turns - turns.floor()));
-        Complex32::new(wave.re as f32, wave.im as f32)
-    };
-    for index in tiles {
-        progress.check()?;
-        let levels = reader.tile(index)?;
-        let file = tile_in_file(plate, index);
-        let rect = tile_on_plate(plate, index).and(part);
-        // The tile in the plate's own rows and columns.
-        let mut own = vec![0u8; rect.area()];
-        for row in file.y[0]..file.y[1] {
-            for column in file.x[0]..file.x[1] {
-                let [x, y] = super::geometry::plate_from_file(plate, [column, row]);
-                if (rect.x[0]..rect.x[1]).contains(&x) && (rect.y[0]..rect.y[1]).contains(&y) {
-                    let at = (row - file.y[0]) as usize * plate.tile as usize + (column - file.x[0]) as usize;
-                    own[(y - rect.y[0]) as usize * rect.width() + (x - rect.x[0]) as usize] = levels[at];
-                }
-            }
-        }
-        let inner = |range: [i64; 2], from: i64| [range[0] - from, range[1] - from];
-        let columns = across.touched(inner(rect.x, part.x[0]), kept[0]);
-        let rows = down.touched(inner(rect.y, part.y[0]), kept[1]);
-        let along: Vec<Complex32> = (rect.x[0]..rect.x[1]).map(|c| turned(-carrier[0] * plate.x(c))).collect();
-        let width = columns.len();
-        let mut lines = vec![Complex32::default(); rect.height() * width];
-        lines.par_chunks_mut(width.max(1)).zip(own.par_chunks(rect.width())).enumerate().for_each_init(
-            || (Vec::new(), Vec::new()),
-            |(reference, lit), (i, (line, levels))| {
-                let row = rect.y[0] + i as i64;
-                plate.reference.row(plate, wavelength, row, rect.x[0]..rect.x[1], reference);
-                let turn = turned(-carrier[1] * plate.y(row));
-                lit.clear();
-                lit.extend(
-                    levels
-                        .iter()
-                        .zip(reference.iter())
-                        .zip(&along)
-                        .map(|((&l, &r), &a)| phasors[usize::from(l)] * r * a * turn),
-                );
-                for (u, column) in line.iter_mut().zip(columns.clone()) {
-                    *u = filtered(&across, (column * across.factor) as i64 - (rect.x[0] - part.x[0]), lit);
-                }
-            },
-        );
-        let first = rows.start;
-        out.par_chunks_mut(kept[0]).skip(first).take(rows.len()).enumerate().for_each(|(i, line)| {
-            let middle = ((first + i) * down.factor) as i64 - (rect.y[0] - part.y[0]);
-            for (row, values) in lines.chunks_exact(width.max(1)).enumerate() {
-                let offset = row as i64 - middle + down.taps;
-                let Some(&weight) = usize::try_from(offset).ok().and_then(|o| down.filter.get(o)) else { continue };
-                for (u, &value) in line[columns.clone()].iter_mut().zip(values) {
-                    *u += value * weight;
-                }
-            }
-        });
-        progress.advance(1);
-    }
-    Ok(out)
-}
-
-/// The filter's sum about a pixel that may stand outside of the line.
-fn filtered(thinning: &Thinning, middle: i64, line: &[Complex32]) -> Complex32 {
-    let from = (middle - thinning.taps).max(0);
-    let to = (middle + thinning.taps + 1).min(line.len() as i64);
-    if from >= to {
-        return Complex32::default();
-    }
-    let weights = &thinning.filter[(from - middle + thinning.taps) as usize..];
-    line[from as usize..to as usize].iter().zip(weights).map(|(u, &w)| u * w).sum()
 }
 
 /// A wave about a carrier.

@@ -55,7 +55,8 @@ impl Reference {
         all.fold(first, |ranges, more| [0, 1].map(|i| [ranges[i][0].min(more[i][0]), ranges[i][1].max(more[i][1])]))
     }
 
-    fn frequencies_at(&self, plate: &Plate, wavelength: f64) -> [[f64; 2]; 2] {
+    /// The same for one lamp [m].
+    pub(super) fn frequencies_at(&self, plate: &Plate, wavelength: f64) -> [[f64; 2]; 2] {
         match *self {
             Self::None => [[0.0; 2]; 2],
             Self::Plane { angle, .. } => angle.map(|a| [a.sin() / wavelength; 2]),

@@ -341,6 +341,17 @@ fn previews_show_points_where_they_are_from_every_eye_and_file() {
             memory: 1 << 30,
         };
         assert!(preview(&path, &wrong, &Progress::new()).unwrap_err().to_string().contains("not on the plate"));
+        // In pieces, because the memory does not hold one transform: the same picture.
+        let once = PreviewSettings { part: None, focus: z, size: (120, 90), ..wrong.clone() };
+        let whole = preview(&path, &once, &Progress::new()).expect("preview");
+        let memory = 1 << 20;
+        let pieces = preview(&path, &PreviewSettings { memory, ..once.clone() }, &Progress::new()).expect("preview");
+        assert!(16 * pieces.transform[0] * pieces.transform[1] < memory as usize, "{:?}", pieces.transform);
+        assert!(16 * whole.transform[0] * whole.transform[1] > memory as usize, "{:?}", whole.transform);
+        let off: f64 =
+            whole.picture.values.iter().zip(&pieces.picture.values).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+        let all: f64 = whole.picture.values.iter().map(|a| f64::from(*a).powi(2)).sum();
+        assert!((off / all).sqrt() < 0.03, "{name}: {}", (off / all).sqrt());
         let small = PreviewSettings { part: None, memory: 1 << 10, ..wrong };
         assert!(matches!(preview(&path, &small, &Progress::new()), Err(Error::Memory { .. })));
     }
@@ -442,6 +453,8 @@ fn through_a_slit_points_stand_at_their_depth_from_left_to_right_and_each_colour
             preview(&path, &settings, &Progress::new()).expect("preview")
         };
         let here = look([0.0, 0.0, 30e-3], None);
+        // The lamp shines on a place 30 mm · tan 10° lower.
+        assert!(!here.dazzled && look([0.0, -5.3e-3, 30e-3], None).dazzled);
         // The strip stands on the plate: on the plane in focus it moves with the eye's height.
         let bright = |seen: &preview::Preview, eye: f64| brightness(seen, x, y + eye * z / 30e-3);
         for eye in [0.0, 1.5e-3, -2e-3] {
