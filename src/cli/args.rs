@@ -7,6 +7,7 @@ use holodrive::units;
 use std::path::PathBuf;
 
 pub(crate) use super::print_args::{ExportArgs, ExportFormat, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs};
+pub(crate) use super::serve_args::{OnClientGoneArg, ServeArgs, ServedLevelsArg};
 pub(crate) use super::scene_args::{
     ColorArgs, DepthArg, FormFactorArg, MirrorDepthArg, PhaseArg, PlacementArg, PlacementArgs, SceneArgs, Wavelengths,
     White,
@@ -84,6 +85,11 @@ pub(crate) enum Command {
         after_help = "Examples:\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml --dry-run\n  holodrive print scenes/cornell.gltf --plate calib/plate-small.toml -o plate\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml -o plate --shard auto"
     )]
     Print(PrintArgs),
+    /// Keep a panel, and show on it what other programs send.
+    #[command(
+        after_help = "Examples:\n  holodrive serve --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive serve --panel generic --monitor none --slmsuite 0 --json\n  holodrive serve --panel mine.toml --monitor HDMI-1 --local --on-client-gone idle --idle flat.png\n  holodrive serve --write-python holodrive.py"
+    )]
+    Serve(ServeArgs),
     /// List the monitors, and which panel profile fits each.
     Monitors(MonitorsArgs),
     /// Look at everything on this desktop that alters levels on their way to a panel.

@@ -1,5 +1,6 @@
 //! The connection to the window system, and the turning of its events.
 
+use super::kernel;
 use super::monitor::Monitor;
 use super::x11::X11;
 use crate::error::{Error, Result};
@@ -144,12 +145,14 @@ impl Display {
     }
 }
 
-/// A monitor as winit describes it; it knows neither EDID nor scan-out.
+/// A monitor as winit describes it, with its EDID from the kernel; neither knows its scan-out.
 fn monitor_of(index: usize, handle: &MonitorHandle, primary: bool) -> Monitor {
     let (size, position) = (handle.size(), handle.position());
+    let name = handle.name().unwrap_or_else(|| format!("monitor-{index}"));
     Monitor {
         index,
-        name: handle.name().unwrap_or_else(|| format!("monitor-{index}")),
+        edid: kernel::edid(&name, (size.width, size.height)),
+        name,
         width: size.width,
         height: size.height,
         x: position.x,
@@ -157,8 +160,8 @@ fn monitor_of(index: usize, handle: &MonitorHandle, primary: bool) -> Monitor {
         refresh: handle.refresh_rate_millihertz().map(|rate| f64::from(rate) / 1e3),
         scale: handle.scale_factor(),
         primary,
-        edid: None,
         scan_out: None,
+        parts: Vec::new(),
     }
 }
 
