@@ -424,7 +424,12 @@ mod local {
         let folder = tempfile::tempdir().expect("folder");
         let socket = folder.path().join("panel.sock");
         let free = Some("127.0.0.1:0".parse().expect("address"));
-        let settings = ServeSettings { slmsuite: free, slmpy: None, local: Some(socket.clone()), ..settings(Duration::from_secs(5)) };
+        let settings = ServeSettings {
+            slmsuite: free,
+            slmpy: None,
+            local: Some(socket.clone()),
+            ..settings(Duration::from_secs(5))
+        };
         let server = Server::start(panel(), &settings).expect("server");
         let address = server.slmsuite().expect("address");
         let (say, said) = std::sync::mpsc::channel();

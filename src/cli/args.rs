@@ -7,11 +7,11 @@ use holodrive::units;
 use std::path::PathBuf;
 
 pub(crate) use super::print_args::{ExportArgs, ExportFormat, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs};
-pub(crate) use super::serve_args::{OnClientGoneArg, ServeArgs, ServedLevelsArg};
 pub(crate) use super::scene_args::{
     ColorArgs, DepthArg, FormFactorArg, MirrorDepthArg, PhaseArg, PlacementArg, PlacementArgs, SceneArgs, Wavelengths,
     White,
 };
+pub(crate) use super::serve_args::{OnClientGoneArg, ServeArgs, ServedLevelsArg};
 
 const EXIT_CODES: &str = "\
 Exit codes: 0 done; 2 wrong flags, bad input, or a file or display that refused (one line says what, where and what to do; \

@@ -102,7 +102,10 @@ fn settings(args: &ServeArgs, served: &ServedPanel, report: &mut Report) -> Resu
     }
     let slmpy = args.slmpy.or(none.then_some(USUAL.1)).map(at);
     if served.bits > 8 && slmpy.is_some() {
-        report.warn([format!("slmPy sends 8 bits: of the panel's {} levels, 256 can be reached by it", 1 << served.bits)]);
+        report.warn([format!(
+            "slmPy sends 8 bits: of the panel's {} levels, 256 can be reached by it",
+            1 << served.bits
+        )]);
     }
     Ok(ServeSettings {
         slmsuite: args.slmsuite.or(none.then_some(USUAL.0)).map(at),
@@ -177,7 +180,8 @@ impl Job<'_> {
 
     #[cfg(not(feature = "display"))]
     fn on_monitor(&self, _: &str, _: &mut Report) -> Result<KeepReport> {
-        let what = "this build has no display: give --monitor none, or build it with the feature `display` (the default)";
+        let what =
+            "this build has no display: give --monitor none, or build it with the feature `display` (the default)";
         Err(Error::unsupported(what))
     }
 
@@ -208,8 +212,10 @@ impl Job<'_> {
             }})
             .to_string()
         } else {
-            let mut text =
-                format!("serving {name}, {width}x{height} px of {bits} bits at {}, on {place}", show_length(*wavelength));
+            let mut text = format!(
+                "serving {name}, {width}x{height} px of {bits} bits at {}, on {place}",
+                show_length(*wavelength)
+            );
             if let Some(at) = slmsuite {
                 text += &format!("\n  slmsuite  {at}  RemoteSLM(\"{name}\", host=\"{}\", port={})", at.ip(), at.port());
             }

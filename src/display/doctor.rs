@@ -80,8 +80,8 @@ pub fn examine(display: &mut Display, choice: Option<&MonitorChoice>) -> Result<
 fn judge_screen(screen: Option<&Screen>) -> Vec<Finding> {
     let finding = |subject, severity, what: String| Finding { monitor: None, subject, severity, what };
     let Some(screen) = screen else {
-        let what = "not X11: gamma, rotation and colour settings of the graphics card cannot be read; check the panel \
-                    with the test card";
+        let what = "not X11: gamma and colour settings of the graphics card cannot be read; check the panel with the test \
+                    card";
         return vec![finding("window system", Severity::Unknown, what.into())];
     };
     let depth = match screen.depth {

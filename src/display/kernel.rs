@@ -27,7 +27,8 @@ fn edid_in(connectors: &Path, name: &str, (width, height): (u32, u32)) -> Option
     let mut found = None;
     for entry in fs::read_dir(connectors).ok()?.flatten() {
         let folder = entry.file_name();
-        let connector = folder.to_str().and_then(|name| name.strip_prefix("card")).and_then(|name| name.split_once('-'));
+        let connector =
+            folder.to_str().and_then(|name| name.strip_prefix("card")).and_then(|name| name.split_once('-'));
         if !connector.is_some_and(|(card, own)| card.parse::<u32>().is_ok() && is_called(own, name)) {
             continue;
         }

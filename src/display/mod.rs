@@ -15,7 +15,8 @@
 //! behind the frame buffer (limited-range RGB, dithering in the card's output stage, overscan in the monitor) cannot
 //! be seen from here.
 //!
-//! On X11 all of this is checked. On Wayland and other systems, what winit tells is.
+//! On X11 all of this is checked. On Wayland size, scale and rotation are; gamma tables and what else alters colours cannot
+//! be asked for. On other systems, what winit tells is checked.
 
 mod doctor;
 mod edid;
@@ -31,6 +32,8 @@ mod show;
 mod test_card;
 mod trigger;
 mod vblank;
+#[cfg(all(unix, not(any(target_vendor = "apple", target_os = "android"))))]
+mod wayland;
 mod window;
 mod x11;
 

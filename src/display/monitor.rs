@@ -31,7 +31,7 @@ pub struct Monitor {
     pub primary: bool,
     /// What the monitor says about itself, where it can be had.
     pub edid: Option<Edid>,
-    /// What happens between frame buffer and cable, where the system tells (X11).
+    /// What happens between frame buffer and cable, where the system tells (X11; of rotation, Wayland).
     pub scan_out: Option<ScanOut>,
     /// The monitors that show it, where it is a region of the desktop and not one of them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -104,7 +104,8 @@ impl Monitor {
         let Some(scan_out) = &self.scan_out else { return faults };
         if scan_out.rotated {
             faults.push(format!(
-                "{name} is rotated or mirrored; turn that off (xrandr --output {name} --rotate normal --reflect normal)"
+                "{name} is rotated or mirrored; turn that off in the desktop's settings (on X11: xrandr --output {name} --rotate \
+                 normal --reflect normal)"
             ));
         }
         if scan_out.transformed {
@@ -381,8 +382,19 @@ mod tests {
     #[test]
     fn malformed_choices_are_refused() {
         for text in [
-            "", "edid:", "serial: ", "index:-1", "index:x", "at:1920", "at:a,b", "region:", "region:1,2,3",
-            "region:1,2,3,0", "region:1,2,-3,4", "region:1,2,3,4,5", "region:0,0,a,4",
+            "",
+            "edid:",
+            "serial: ",
+            "index:-1",
+            "index:x",
+            "at:1920",
+            "at:a,b",
+            "region:",
+            "region:1,2,3",
+            "region:1,2,3,0",
+            "region:1,2,-3,4",
+            "region:1,2,3,4,5",
+            "region:0,0,a,4",
         ] {
             let refused = text.parse::<MonitorChoice>();
             assert!(matches!(refused, Err(Error::Parameter { .. })), "{text}: {refused:?}");

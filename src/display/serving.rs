@@ -80,6 +80,10 @@ impl Output for ServedWindow<'_> {
         let limit = self.refresh().map_or(Duration::ZERO, |refresh| Duration::from_secs_f64(2.0 * refresh));
         self.panel.wait_for_vertical_blank(limit)?;
         let presented = self.panel.present(&frame)?;
+        if self.display.x11().is_none() {
+            // Elsewhere requests leave for the window system only in a turn of its events.
+            self.display.turn(Duration::ZERO)?;
+        }
         if !presented.taken {
             return Err(Error::Display { what: "the window system does not take frames now".into() });
         }
@@ -95,6 +99,8 @@ impl Output for ServedWindow<'_> {
 /// A frame in the video signal of its panel.
 fn packed(frame: &Frame) -> Result<DisplayFrame> {
     let signal = frame.metadata.panel.signal.pack(&[frame])?;
-    let pixels = signal.rgb.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+    // The same memory, read as pixels.
+    let pixels = bytemuck::allocation::try_cast_vec(signal.rgb)
+        .unwrap_or_else(|(_, rgb)| rgb.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect());
     DisplayFrame::from_rgb(signal.width as u32, signal.height as u32, pixels)
 }

@@ -285,7 +285,8 @@ impl Open {
         }
         let on_x11 = display.x11().is_some();
         if !on_x11 && !monitor.parts.is_empty() {
-            let what = "a region of the desktop, or several monitors at once, can be covered on X11 only; name one monitor";
+            let what =
+                "a region of the desktop, or several monitors at once, can be covered on X11 only; name one monitor";
             return Err(Error::Display { what: what.into() });
         }
         let window = display.with_event_loop(|event_loop| create(event_loop, monitor, on_x11))??;

@@ -210,9 +210,7 @@ impl Drop for Server {
             // A connection wakes the listener, which then sees that it is to stop. Without it the thread stays, waiting,
             // and does no harm.
             let knocked = match &door {
-                Door::Tcp(address) => {
-                    TcpStream::connect_timeout(&reachable(*address), Duration::from_secs(1)).is_ok()
-                }
+                Door::Tcp(address) => TcpStream::connect_timeout(&reachable(*address), Duration::from_secs(1)).is_ok(),
                 #[cfg(unix)]
                 Door::Local(path) => std::os::unix::net::UnixStream::connect(path).is_ok(),
             };

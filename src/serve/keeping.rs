@@ -2,12 +2,14 @@
 
 use super::output::{Output, Readiness};
 use super::{Flip, SentFrame, ServeCounts, ServedPanel, Server};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::panel::{
-    Applied, Frame, FringePattern, Modulation, PanelProfile, Pattern, PhasePattern, Wavefront, drive,
+    Applied, Frame, FrameMetadata, FringePattern, Modulation, NearestTable, PanelProfile, Pattern, PhasePattern,
+    Wavefront, drive,
 };
 use crate::progress::Progress;
+use crate::units::show_length;
 use serde::Serialize;
 use std::time::Duration;
 
@@ -65,6 +67,8 @@ pub struct Driver {
     wavelength: f64,
     correction: Option<Wavefront>,
     grid: Grid,
+    /// Where all pixels have one phase curve.
+    table: Option<NearestTable>,
 }
 
 impl Driver {
@@ -73,11 +77,12 @@ impl Driver {
     /// # Errors
     /// [`crate::Error::Calibration`] when curve or correction do not hold at this wavelength.
     pub fn new(profile: &PanelProfile, wavelength: f64, correction: Option<Wavefront>) -> Result<Self> {
-        profile.pixel_curve(wavelength)?;
+        let curve = profile.pixel_curve(wavelength)?.0;
+        let table = if curve.differs() { None } else { NearestTable::new(&curve.mean) };
         if let Some(correction) = &correction {
             correction.check(profile.width, profile.height, wavelength)?;
         }
-        Ok(Self { grid: profile.grid()?, profile: profile.clone(), wavelength, correction })
+        Ok(Self { grid: profile.grid()?, profile: profile.clone(), wavelength, correction, table })
     }
 
     /// What clients are told of the panel, under `name`.
@@ -117,6 +122,9 @@ impl Driver {
                 Ok(frame)
             }
             (SentFrame::Values(phase), Modulation::Phase) => {
+                if let Some(table) = &self.table {
+                    return self.by_table(table, &phase);
+                }
                 let pattern = Pattern::Phase(PhasePattern::new(self.grid, self.wavelength, phase)?);
                 Ok(drive(&pattern, self.correction.as_ref(), &self.profile)?.frame)
             }
@@ -125,6 +133,29 @@ impl Driver {
                 Ok(drive(&pattern, None, &self.profile)?.frame)
             }
         }
+    }
+}
+
+impl Driver {
+    /// What [`drive`] makes of a phase, without its figures: fast enough for a panel's rate.
+    fn by_table(&self, table: &NearestTable, phase: &[f32]) -> Result<Frame> {
+        let Grid { width, height, .. } = self.grid;
+        if phase.len() != self.grid.len() {
+            let what = format!("{} values for the {width}×{height} pixels of {}", phase.len(), self.profile.name);
+            return Err(Error::parameter("pattern", what));
+        }
+        let bend = self.correction.as_ref().map(|correction| correction.phase.as_slice());
+        let levels = table.levels(phase, bend).map_err(|i| {
+            let what = format!("the value at column {}, row {} is not finite", i % width, i / width);
+            Error::parameter("pattern", what)
+        })?;
+        let mut metadata = FrameMetadata::new(&self.profile, self.wavelength);
+        metadata.applied = Applied {
+            correction: self.correction.as_ref().map(|correction| correction.name.clone()),
+            curve: Some(format!("{} at {}", self.profile.name, show_length(self.wavelength))),
+            packing: None,
+        };
+        Ok(Frame { width, height, bits: self.profile.bits, levels, metadata })
     }
 }
 
@@ -198,4 +229,36 @@ pub fn keep(
     report.latency.mean = waited.as_secs_f64() / report.shown.max(1) as f64;
     report.counts = server.counts();
     Ok(report)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn phases_become_the_levels_that_drive_finds() {
+        let text = "name = \"t\"\nmaker = \"t\"\nkind = \"phase-lcos\"\nwidth = 61\nheight = 37\npitch = \"8um\"\nbits = 8\n\
+                    fill_factor = 1.0\nwavelengths = [\"532nm\"]\n[[response]]\nkind = \"polynomial\"\nunit = \"rad\"\n\
+                    coefficients = [0.1, 5.0, 0.9]\n";
+        let profile = PanelProfile::parse(text, Path::new("t.toml")).expect("profile");
+        let phase: Vec<f32> = (0..61 * 37).map(|i| 0.37 * i as f32 - 300.0).collect();
+        let bend = (0..61 * 37).map(|i| (i % 61) as f32 * 0.21).collect();
+        let bend = Wavefront::new("bend", 61, 37, Some(532e-9), bend).expect("wavefront");
+        for correction in [None, Some(bend)] {
+            let driver = Driver::new(&profile, 532e-9, correction.clone()).expect("driver");
+            let frame = driver.frame(SentFrame::Values(phase.clone())).expect("frame");
+            let pattern = PhasePattern::new(profile.grid().expect("grid"), 532e-9, phase.clone()).expect("pattern");
+            let driven = drive(&Pattern::Phase(pattern), correction.as_ref(), &profile).expect("driven").frame;
+            assert_eq!(frame.levels, driven.levels);
+            assert_eq!(frame.metadata.applied, driven.metadata.applied);
+            // 5.9 of 6.28 rad over the levels: all of them are less than a turn.
+            let part = driver.served("t").wavelength / driver.served("t").design_wavelength;
+            assert!(part > 1.0 && part < 1.2, "{part}");
+            let wrong = driver.frame(SentFrame::Values(vec![f32::NAN; 61 * 37])).expect_err("not finite").to_string();
+            assert!(wrong.contains("column 0, row 0"), "{wrong}");
+            assert!(driver.frame(SentFrame::Values(vec![0.0; 5])).is_err());
+            assert!(driver.frame(SentFrame::Levels(vec![256; 61 * 37])).is_err());
+        }
+    }
 }

@@ -228,13 +228,17 @@ mod tests {
     #[test]
     fn frames_of_both_widths_are_read() {
         let bytes: Vec<u8> = (0..15).map(|i| i * 17).collect();
-        let Ok(Wish::Show(SentFrame::Levels(sent))) = read(request("[3, 5]", "uint8", &packed(&bytes)).as_bytes(), &panel(), false) else {
+        let Ok(Wish::Show(SentFrame::Levels(sent))) =
+            read(request("[3, 5]", "uint8", &packed(&bytes)).as_bytes(), &panel(), false)
+        else {
             panic!("not read");
         };
         assert!(sent.iter().zip(&bytes).all(|(level, byte)| *level == u16::from(*byte)));
         let words: Vec<u16> = (0..15).map(|i| i * 73).collect();
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-        let Ok(Wish::Show(SentFrame::Levels(sent))) = read(request("[3, 5]", "uint16", &packed(&bytes)).as_bytes(), &panel(), false) else {
+        let Ok(Wish::Show(SentFrame::Levels(sent))) =
+            read(request("[3, 5]", "uint16", &packed(&bytes)).as_bytes(), &panel(), false)
+        else {
             panic!("not read");
         };
         assert_eq!(sent, words);

@@ -16,6 +16,7 @@ mod pixels;
 mod server;
 mod serving;
 mod timing;
+mod wayland;
 mod window_manager;
 
 use desk::Desk;
@@ -47,6 +48,7 @@ fn main() -> ExitCode {
         timing::CASES,
         serving::CASES,
         window_manager::CASES,
+        wayland::CASES,
         binary::CASES,
     ]
     .concat();

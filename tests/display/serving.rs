@@ -27,7 +27,7 @@ pub(crate) const CASES: &[Case] = &[
 ];
 
 /// `holodrive serve` at work on the panel's monitor.
-struct Served {
+pub(crate) struct Served {
     process: Child,
     said: BufReader<ChildStdout>,
     folder: tempfile::TempDir,
@@ -43,7 +43,11 @@ impl Served {
     }
 
     fn start_in(desk: &Desk, folder: tempfile::TempDir, monitor: &str, more: &[&str]) -> Self {
-        let mut command = program(desk, folder.path());
+        Self::begin(program(desk, folder.path()), folder, monitor, more)
+    }
+
+    /// Starts it as `command`, which is the program in `folder` without arguments.
+    pub(crate) fn begin(mut command: Command, folder: tempfile::TempDir, monitor: &str, more: &[&str]) -> Self {
         command.args(["serve", "--json", "--monitor", monitor, "--slmsuite", "0", "--slmpy", "0", "--local", "s.sock"]);
         command.args(["--present", "software", "--name", "panel"]).args(more);
         let mut process = command.stdout(Stdio::piped()).spawn().expect("runs");
@@ -64,7 +68,7 @@ impl Served {
     }
 
     /// Ends it as a terminal's Ctrl-C does, and returns its report.
-    fn stop(mut self) -> serde_json::Value {
+    pub(crate) fn stop(mut self) -> serde_json::Value {
         let pid = self.process.id().to_string();
         assert!(Command::new("kill").args(["-INT", &pid]).status().expect("kill").success());
         let mut text = String::new();
@@ -94,16 +98,16 @@ fn flat(level: u8, plug: &Plug) -> Picture {
 }
 
 /// A client of slmPy's protocol.
-struct SlmPy(TcpStream);
+pub(crate) struct SlmPy(TcpStream);
 
 impl SlmPy {
-    fn connect(served: &Served) -> Self {
+    pub(crate) fn connect(served: &Served) -> Self {
         let stream = TcpStream::connect(("127.0.0.1", served.slmpy)).expect("connect");
         stream.set_read_timeout(Some(PATIENCE)).expect("timeout");
         Self(stream)
     }
 
-    fn send(&mut self, picture: &Picture) -> String {
+    pub(crate) fn send(&mut self, picture: &Picture) -> String {
         let levels: Vec<u8> = picture.pixels.iter().map(|pixel| pixel[0]).collect();
         self.0.write_all(&(levels.len() as i32).to_le_bytes()).expect("length");
         self.0.write_all(&levels).expect("frame");
@@ -148,7 +152,8 @@ impl Python {
     /// Starts it, if that Python has `module`; else says what is missing.
     fn start(module: &str, text: &str, arguments: &[&str]) -> Result<Self, Ended> {
         let python = std::env::var("HOLODRIVE_PYTHON").unwrap_or_else(|_| "python3".into());
-        let probe = Command::new(&python).args(["-c", &format!("import {module}")]).stderr(Stdio::null()).status();
+        let look = format!("import importlib.util, sys; sys.exit(importlib.util.find_spec('{module}') is None)");
+        let probe = Command::new(&python).args(["-c", &look]).stderr(Stdio::null()).status();
         if !probe.is_ok_and(|status| status.success()) {
             assert!(std::env::var_os("HOLODRIVE_PYTHON").is_none(), "{python} has no {module}");
             return Err(Ended::Optional(format!("{python} has no {module}")));
@@ -191,20 +196,21 @@ fn levels(number: u32, count: u32) -> impl Iterator<Item = u32> {
     (0..count).map(move |i| i.wrapping_mul(2_654_435_761).wrapping_add(number.wrapping_mul(40_503)))
 }
 
-/// Sends frame n through `RemoteSLM` for each line that it reads; "phase" sends all phases of a turn instead.
+/// "connect PORT BITS" makes a `RemoteSLM`; a number n sends frame n through it; "phase" sends all phases of a turn.
 const SLMSUITE: &str = "
 import sys
 import numpy as np
 from slmsuite.hardware.slms.remote import RemoteSLM
-bits = int(sys.argv[2])
-slm = RemoteSLM('panel', host='127.0.0.1', port=int(sys.argv[1]))
-assert slm.shape == (1080, 1920), slm.shape
-assert slm.bitdepth == bits
-assert abs(slm.wav_um - 0.6328) < 1e-9
-assert abs(slm.phase_scaling - 1) < 1e-9, slm.phase_scaling
 i = np.arange(1920 * 1080, dtype=np.uint32)
 for line in sys.stdin:
-    if line.startswith('phase'):
+    if line.startswith('connect'):
+        port, bits = (int(word) for word in line.split()[1:])
+        slm = RemoteSLM('panel', host='127.0.0.1', port=port)
+        assert slm.shape == (1080, 1920), slm.shape
+        assert slm.bitdepth == bits
+        assert abs(slm.wav_um - 0.6328) < 1e-9
+        assert abs(slm.phase_scaling - 1) < 1e-9, slm.phase_scaling
+    elif line.startswith('phase'):
         slm.set_phase(2 * np.pi / 256 * (i.reshape(1080, 1920) % 256).astype(float), settle=False)
     else:
         n = np.uint32(int(line))
@@ -216,11 +222,11 @@ for line in sys.stdin:
 fn slmsuite(desk: &Desk) -> Ended {
     let plug = desk.plug(PANEL);
     let served = Served::start(desk, PANEL, &[]);
-    let arguments = [&served.slmsuite.to_string(), "8"];
-    let mut client = match Python::start("slmsuite.hardware.slms.remote", SLMSUITE, &arguments) {
+    let mut client = match Python::start("slmsuite", SLMSUITE, &[]) {
         Ok(client) => client,
         Err(ended) => return ended,
     };
+    client.ask(&format!("connect {} 8", served.slmsuite));
     let picture = |level: &dyn Fn(u32) -> [u8; 3], number| {
         let pixels = levels(number, 1920 * 1080).map(level).collect();
         Picture { width: 1920, height: 1080, pixels }
@@ -230,25 +236,21 @@ fn slmsuite(desk: &Desk) -> Ended {
         let (seen, wanted) = (desk.capture_monitor(&plug), picture(&|word| [(word >> 24) as u8; 3], number));
         assert!(seen == wanted, "not what Python sent: {}", seen.difference(&wanted));
     }
-    client.end();
     let report = served.stop();
     assert_eq!((&report["served"]["shown"], &report["served"]["failed"]), (&5.into(), &0.into()), "{report}");
     // slmsuite's levels as phases: the panel's own curve, which rises, makes levels of them.
     let served = Served::start(desk, PANEL, &["--levels", "calibrated"]);
-    let arguments = [&served.slmsuite.to_string(), "8"];
-    let Ok(mut client) = Python::start("slmsuite.hardware.slms.remote", SLMSUITE, &arguments) else { panic!("python") };
+    client.ask(&format!("connect {} 8", served.slmsuite));
     client.ask("phase");
     let pixels = (0..1920 * 1080).map(|i| [(i % 256) as u8; 3]).collect();
     let (seen, wanted) = (desk.capture_monitor(&plug), Picture { width: 1920, height: 1080, pixels });
     assert!(seen == wanted, "not the phases that Python meant: {}", seen.difference(&wanted));
-    client.end();
     served.stop();
     // Ten bits in a Santec head's colours.
     let folder = tempfile::tempdir().expect("folder");
     profile(folder.path(), "bits = 10", 1024, "[signal]\npacking = \"santec-60\"");
     let served = Served::start_in(desk, folder, PANEL, &["--panel", "panel.toml"]);
-    let arguments = [&served.slmsuite.to_string(), "10"];
-    let Ok(mut client) = Python::start("slmsuite.hardware.slms.remote", SLMSUITE, &arguments) else { panic!("python") };
+    client.ask(&format!("connect {} 10", served.slmsuite));
     client.ask("3");
     let (seen, wanted) = (desk.capture_monitor(&plug), picture(&|word| santec(word >> 22), 3));
     assert!(seen == wanted, "ten bits are packed otherwise: {}", seen.difference(&wanted));
@@ -349,7 +351,7 @@ fn python(desk: &Desk) -> Ended {
     let text = format!(
         "name = \"panel\"\nmaker = \"test\"\nkind = \"phase-lcos\"\nwidth = 1920\nheight = 1080\nbits = 8\npitch = \"8um\"\n\
          fill_factor = 0.9\nwavelengths = [\"632.8nm\"]\nrefresh = \"60Hz\"\n\n[[response]]\nkind = \"polynomial\"\n\
-         coefficients = [{curve}]\n\n[[correction]]\nfile = \"bend.npy\"\nwavelength = \"632.8nm\"\n"
+         unit = \"rad\"\ncoefficients = [{curve}]\n\n[[correction]]\nfile = \"bend.npy\"\nwavelength = \"632.8nm\"\n"
     );
     std::fs::write(folder.path().join("panel.toml"), text).expect("profile");
     let bend: Vec<f32> = (0..1920 * 1080).map(|i| ((i % 1920 / 100 + i / 1920 / 90) % 16) as f32 * 0.37).collect();
@@ -409,7 +411,8 @@ impl Local {
         let mut line = String::new();
         stream.read_line(&mut line).expect("greeting");
         let about: serde_json::Value = serde_json::from_str(&line).expect("greeting");
-        let buffer = std::fs::File::options().write(true).open(about["buffer"].as_str().expect("path")).expect("buffer");
+        let buffer =
+            std::fs::File::options().write(true).open(about["buffer"].as_str().expect("path")).expect("buffer");
         Self { stream, buffer }
     }
 
@@ -529,7 +532,11 @@ fn bad_clients(desk: &Desk) -> Ended {
     let mut endless = Local::connect(&served.socket());
     let _ = endless.stream.get_mut().write_all(&vec![b'{'; 100_000]);
     let besides = (1..4).map(still).max().expect("times");
-    println!("  a frame among bad clients: {:.0} ms, alone {:.0} ms", besides.as_secs_f64() * 1e3, alone.as_secs_f64() * 1e3);
+    println!(
+        "  a frame among bad clients: {:.0} ms, alone {:.0} ms",
+        besides.as_secs_f64() * 1e3,
+        alone.as_secs_f64() * 1e3
+    );
     // Nobody waited for anybody's patience (5 s).
     assert!(besides < Duration::from_secs(4), "{besides:?}");
     let report = served.stop();
