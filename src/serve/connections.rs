@@ -166,10 +166,14 @@ impl Server {
     }
 
     /// The socket of the local protocol.
+    #[cfg(unix)]
     pub fn local(&self) -> Option<&Path> {
-        #[cfg(unix)]
-        return self.shared.local.as_ref().map(super::local::Place::socket);
-        #[cfg(not(unix))]
+        self.shared.local.as_ref().map(super::local::Place::socket)
+    }
+
+    /// The socket of the local protocol: there is none on this system.
+    #[cfg(not(unix))]
+    pub fn local(&self) -> Option<&Path> {
         None
     }
 

@@ -138,9 +138,7 @@ impl<'a> Conversation<'a> {
                     Ok(None)
                 }
                 local::Wish::Show(values) => {
-                    let limit = buffer.bytes();
-                    let room = self.hold(limit, limit);
-                    let frame = if room { buffer.take(values, &shared.panel) } else { Err(local::BUSY.to_owned()) };
+                    let frame = self.wait_for_room(buffer.bytes()).and_then(|()| buffer.take(values, &shared.panel));
                     self.release();
                     frame.map(Some)
                 }
@@ -264,6 +262,20 @@ impl<'a> Conversation<'a> {
         let before = self.shared.held.fetch_add(bytes, Ordering::SeqCst);
         self.held += bytes;
         before + bytes <= HELD_REQUESTS * limit
+    }
+
+    /// Takes `bytes` of the budget as soon as others have given back what they held.
+    #[cfg(unix)]
+    fn wait_for_room(&mut self, bytes: usize) -> Result<(), String> {
+        let start = Instant::now();
+        while !self.hold(bytes, bytes) {
+            self.release();
+            if start.elapsed() > self.shared.patience {
+                return Err(local::BUSY.to_owned());
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Ok(())
     }
 
     fn release(&mut self) {

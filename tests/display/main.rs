@@ -14,8 +14,10 @@ mod monitors;
 mod ownership;
 mod pixels;
 mod server;
+#[cfg(unix)]
 mod serving;
 mod timing;
+#[cfg(unix)]
 mod wayland;
 mod window_manager;
 
@@ -46,8 +48,10 @@ fn main() -> ExitCode {
         pixels::CASES,
         ownership::CASES,
         timing::CASES,
+        #[cfg(unix)]
         serving::CASES,
         window_manager::CASES,
+        #[cfg(unix)]
         wayland::CASES,
         binary::CASES,
     ]

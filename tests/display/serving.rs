@@ -346,8 +346,8 @@ fn python(desk: &Desk) -> Ended {
     let plug = desk.plug(PANEL);
     let folder = tempfile::tempdir().expect("folder");
     let path = |name: &str| folder.path().join(name).display().to_string();
-    // A bent curve of 2.14π in all, and a correction of sixteen values with its wavelength beside it.
-    let curve = "0.05,5.2,1.9,-0.4";
+    // A bent curve of 1.94π in all, and a correction of sixteen values.
+    let curve = "0.05,5.0,1.5,-0.4";
     let text = format!(
         "name = \"panel\"\nmaker = \"test\"\nkind = \"phase-lcos\"\nwidth = 1920\nheight = 1080\nbits = 8\npitch = \"8um\"\n\
          fill_factor = 0.9\nwavelengths = [\"632.8nm\"]\nrefresh = \"60Hz\"\n\n[[response]]\nkind = \"polynomial\"\n\
