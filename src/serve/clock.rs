@@ -24,7 +24,7 @@ fn now() -> Option<f64> {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
     // SAFETY: `time` is ours and lives through the call, which writes nothing else.
     let told = unsafe { libc::clock_gettime(CLOCK, &raw mut time) };
-    (told == 0).then(|| time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9)
+    (told == 0).then_some(time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9)
 }
 
 #[cfg(not(unix))]
