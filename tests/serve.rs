@@ -420,6 +420,37 @@ mod local {
     }
 
     #[test]
+    fn three_thousand_local_requests_a_tenth_of_them_garbage() {
+        let folder = tempfile::tempdir().expect("folder");
+        let (running, socket) = start(folder.path(), 8);
+        let mut client = Client::connect(&socket);
+        let (mut wanted, mut early) = (Vec::new(), None);
+        for number in 0..3_000u32 {
+            if number % 10 != 9 {
+                client.show(&frame(number), LEVELS);
+                wanted.push(levels(&frame(number)));
+            } else if number % 20 == 9 {
+                assert!(client.ask("{\"show\": \"levels\"").contains("error"));
+            } else {
+                // One that goes in the middle of its request.
+                let mut gone = Client::connect(&socket);
+                gone.stream.get_mut().write_all(b"{\"show\": ").expect("half");
+            }
+            if number == 600 {
+                early = resident();
+            }
+        }
+        let late = resident();
+        let (server, shown) = running.end();
+        assert!(shown == wanted, "frames were lost or made up");
+        assert_eq!(server.counts().frames, 2_700);
+        if let (Some(early), Some(late)) = (early, late) {
+            // The test itself keeps 2,160 frames twice, 1.5 kB each; other tests of this process are at work beside it.
+            assert!(late < early + 40_000_000, "memory grew by {} bytes", late - early);
+        }
+    }
+
+    #[test]
     fn a_client_that_has_gone_is_known() {
         let folder = tempfile::tempdir().expect("folder");
         let socket = folder.path().join("panel.sock");

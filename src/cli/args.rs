@@ -86,6 +86,9 @@ pub(crate) enum Command {
     )]
     Print(PrintArgs),
     /// Keep a panel, and show on it what other programs send.
+    ///
+    /// Runs until Ctrl-C, or Esc on the panel. The first line says where clients come in (with --json: one line of JSON with
+    /// the ports that it got); the report comes at the end.
     #[command(
         after_help = "Examples:\n  holodrive serve --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive serve --panel generic --monitor none --slmsuite 0 --json\n  holodrive serve --panel mine.toml --monitor HDMI-1 --local --on-client-gone idle --idle flat.png\n  holodrive serve --write-python holodrive.py"
     )]

@@ -37,6 +37,7 @@ pub(super) fn serve(args: &ServeArgs, json: bool) -> Result<Report> {
     }
     let panel = panel(&args.panel, &mut report)?;
     let correction = panel_correction(&panel, args.correction.as_deref(), &mut report)?;
+    report.warn(panel.profile.drive_curve(panel.wavelength)?.1);
     let driver = Driver::new(&panel.profile, panel.wavelength, correction)?;
     let idle = idle_frame(&args.idle, &panel, &driver, &mut report)?;
     let served = driver.served(&name(args, &panel)?);

@@ -151,6 +151,10 @@ class SLM:
             # A late answer would be taken for that of the next request.
             self.close()
             raise Error("the program does not answer: %s" % error) from error
+        except BaseException:
+            # Ctrl-C: the same.
+            self.close()
+            raise
         if not line.endswith(b"\n"):
             self.close()
             raise Error("the program has ended")
