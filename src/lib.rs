@@ -54,7 +54,7 @@
 //! 15. [`pipeline`]: the whole way, on one screen
 //! 16. [`comparison`]: all encodings side by side, with figures
 //! 17. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
-//! 18. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols
+//! 18. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols, a local one for Python; the panel kept for them
 //! 19. [`display`]: monitors and the fullscreen window (feature `display`)
 
 pub mod comparison;

@@ -251,7 +251,9 @@ fn reports_are_json_and_help_has_examples() {
     assert!(report["points"].as_u64().expect("points") > 20);
     assert_eq!(report["command"], "points");
     assert!(f.join("p.ply").is_file() && f.join("t.npy").is_file());
-    for command in ["points", "compute", "propagate", "encode", "reconstruct", "show", "print", "calibrate", "bench"] {
+    for command in
+        ["points", "compute", "propagate", "encode", "reconstruct", "show", "print", "calibrate", "bench", "serve"]
+    {
         let help = holodrive(f, &[command, "--help"]);
         let text = String::from_utf8_lossy(&help.stdout).to_string();
         assert!(help.status.success() && text.contains(&format!("holodrive {command} ")), "{text}");
@@ -297,6 +299,70 @@ fn reports_state_exposure_budget_and_gamut() {
         assert!(metadata["origin"].as_str().is_some_and(|o| o.contains(&format!("{name} of three lasers"))), "{text}");
     }
     assert!(!f.join("f.npy").exists());
+}
+
+#[test]
+fn serve_takes_frames_without_a_panel_and_refuses_in_one_line() {
+    use std::io::{BufRead, BufReader, Read, Write};
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    let none = ["serve", "--monitor", "none", "--slmpy", "0"];
+    for (flags, expected) in [
+        (&[][..], "--monitor"),
+        (&["--monitor", "none", "--idle", "256"], "255"),
+        (&["--monitor", "none", "--idle", "nowhere.png"], "nowhere.png"),
+        (&["--monitor", "none", "--name", "a/b"], "--name"),
+        (&["--monitor", "none", "--levels", "calibrated", "--panel", "generic-amplitude"], "--levels"),
+        (&["--monitor", "none", "--panel", "no-such-panel"], "no-such-panel"),
+        (&["--monitor", "none", "--trigger-patch", "top-left,8"], "--trigger-patch"),
+        (&["--monitor", "none", "--listen", "nowhere"], "--listen"),
+        (&["--monitor", "none", "--slmpy", "0", "--correction", "no.npy"], "no.npy"),
+        (&["--monitor", "none", "--slmsuite", "65536"], "--slmsuite"),
+    ] {
+        refused(f, &[&["serve"], flags].concat(), expected);
+    }
+    let small = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("calib/generic.toml")).expect("profile");
+    write(f, "small.toml", small.replace("width = 1920", "width = 24").replace("height = 1080", "height = 16"));
+    let mut program = Command::new(env!("CARGO_BIN_EXE_holodrive"))
+        .args([&none[..], &["--json", "--panel", "small.toml", "--idle", "9", "-o", "frames"]].concat())
+        .current_dir(f)
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .expect("runs");
+    let mut said = BufReader::new(program.stdout.take().expect("output"));
+    let mut line = String::new();
+    said.read_line(&mut line).expect("first line");
+    let told: serde_json::Value = serde_json::from_str(&line).expect("JSON in one line");
+    assert_eq!(told["serving"]["slmsuite"], serde_json::Value::Null, "only what was asked for");
+    let mut client =
+        std::net::TcpStream::connect(told["serving"]["slmpy"].as_str().expect("address")).expect("connect");
+    for number in 1..=2u8 {
+        let levels: Vec<u8> = (0..24 * 16).map(|i| (i % 251) as u8 ^ number).collect();
+        client.write_all(&(levels.len() as i32).to_le_bytes()).expect("length");
+        client.write_all(&levels).expect("frame");
+        let mut answer = [0; 4];
+        client.read_exact(&mut answer).expect("answer");
+        assert_eq!(&answer, b"done");
+        let kept = image::open(f.join(format!("frames/frame-00000{number}.png"))).expect("frame").into_luma8();
+        assert_eq!(kept.into_raw(), levels);
+    }
+    let idle = image::open(f.join("frames/frame-000000.png")).expect("idle frame").into_luma8();
+    assert!(idle.into_raw().iter().all(|&level| level == 9));
+    // The file says enough for what would be seen of it.
+    let seen = holodrive(f, &["reconstruct", "frames/frame-000002.png", "--distance", "20mm", "-o", "seen.png"]);
+    assert!(seen.status.success(), "{}", String::from_utf8_lossy(&seen.stderr));
+    #[cfg(unix)]
+    {
+        let asked = Command::new("kill").args(["-TERM", &program.id().to_string()]).status().expect("kill");
+        assert!(asked.success());
+        let mut report = String::new();
+        said.read_to_string(&mut report).expect("report");
+        assert!(program.wait().expect("ends").success());
+        let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+        assert_eq!((&report["served"]["shown"], &report["served"]["failed"]), (&2.into(), &0.into()), "{report}");
+    }
+    #[cfg(not(unix))]
+    program.kill().expect("kill");
 }
 
 /// Commands in the README's `sh` blocks, in their order.

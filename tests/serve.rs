@@ -3,7 +3,8 @@
 
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
-use holodrive::serve::{FrameRequest, SentLevels, ServeSettings, ServedPanel, Server};
+use holodrive::panel::Modulation;
+use holodrive::serve::{Flip, FrameRequest, SentFrame, ServeSettings, ServedPanel, Server};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
@@ -20,6 +21,7 @@ fn panel() -> ServedPanel {
         width: WIDTH,
         height: HEIGHT,
         bits: 8,
+        modulation: Modulation::Phase,
         pixel_pitch: [8e-6; 2],
         wavelength: 532e-9,
         design_wavelength: 532e-9,
@@ -29,13 +31,13 @@ fn panel() -> ServedPanel {
 
 fn settings(patience: Duration) -> ServeSettings {
     let free = Some("127.0.0.1:0".parse().expect("address"));
-    ServeSettings { slmsuite: free, slmpy: free, connections: 16, patience }
+    ServeSettings { slmsuite: free, slmpy: free, connections: 16, patience, ..ServeSettings::default() }
 }
 
 /// Takes every frame as a panel would, and keeps them.
 struct Panel {
     stop: Arc<AtomicBool>,
-    thread: JoinHandle<(Server, Vec<SentLevels>)>,
+    thread: JoinHandle<(Server, Vec<SentFrame>)>,
 }
 
 impl Panel {
@@ -46,8 +48,8 @@ impl Panel {
             let mut shown = Vec::new();
             while !stopped.load(Ordering::SeqCst) {
                 if let Some(request) = server.next(Duration::from_millis(5)) {
-                    shown.push(request.levels().clone());
-                    request.shown();
+                    shown.push(request.frame().clone());
+                    request.shown(flip(shown.len() as u64));
                 }
             }
             (server, shown)
@@ -55,10 +57,19 @@ impl Panel {
         Self { stop, thread }
     }
 
-    fn end(self) -> (Server, Vec<SentLevels>) {
+    fn end(self) -> (Server, Vec<SentFrame>) {
         self.stop.store(true, Ordering::SeqCst);
         self.thread.join().expect("panel")
     }
+}
+
+fn flip(number: u64) -> Flip {
+    Flip { at: Instant::now(), number, missed: 0 }
+}
+
+/// Levels as they are handed on.
+fn levels(bytes: &[u8]) -> SentFrame {
+    SentFrame::Levels(bytes.iter().copied().map(u16::from).collect())
 }
 
 /// A frame that differs in every level from its neighbours in time.
@@ -130,10 +141,10 @@ fn a_client_is_answered_only_when_its_frame_is_shown() {
         (answer, Instant::now())
     });
     let waiting: FrameRequest = server.next(Duration::from_secs(20)).expect("frame");
-    assert!(waiting.levels().levels.iter().zip(frame(3)).all(|(level, byte)| *level == u16::from(byte)));
+    assert_eq!(*waiting.frame(), levels(&frame(3)));
     std::thread::sleep(Duration::from_millis(200));
     let shown = Instant::now();
-    waiting.shown();
+    waiting.shown(flip(1));
     let (answer, answered) = client.join().expect("client");
     assert_eq!(answer, SHOWN);
     assert!(answered > shown);
@@ -175,8 +186,7 @@ fn slmpy_sends_frame_after_frame_in_one_connection() {
     let _ = stream.read_to_end(&mut rest);
     assert_eq!(rest, b"err");
     let (server, shown) = running.end();
-    let wanted: Vec<Vec<u16>> = [1, 2, 4].map(|number| frame(number).into_iter().map(u16::from).collect()).into();
-    assert_eq!(shown.into_iter().map(|sent| sent.levels).collect::<Vec<_>>(), wanted);
+    assert_eq!(shown, [1, 2, 4].map(|number| levels(&frame(number))));
     assert_eq!(server.counts().refused, 2);
 }
 
@@ -250,12 +260,231 @@ fn ten_thousand_requests_a_tenth_of_them_garbage() {
     let (server, shown) = running.end();
     assert_eq!(shown.len(), wanted.len(), "frames were lost or made up");
     for (sent, number) in shown.iter().zip(wanted) {
-        assert!(sent.levels.iter().zip(frame(number)).all(|(level, byte)| *level == u16::from(byte)), "frame {number}");
+        assert!(*sent == levels(&frame(number)), "frame {number}");
     }
     assert_eq!(server.counts().frames, 9_000);
     if let (Some(early), Some(late)) = (early, late) {
         // The test itself keeps 7,200 frames of 1.5 kB from there on: 11 MB; ten more for the allocator.
         assert!(late < early + 21_000_000, "memory grew by {} bytes", late - early);
+    }
+}
+
+#[test]
+fn an_answer_waits_until_the_panel_has_settled() {
+    let settings = ServeSettings { settle: Duration::from_millis(300), ..settings(Duration::from_secs(20)) };
+    let server = Server::start(panel(), &settings).expect("server");
+    let address = server.slmsuite().expect("address");
+    let running = Panel::run(server);
+    let start = Instant::now();
+    assert_eq!(ask(address, &request(&frame(1), HEIGHT)), SHOWN);
+    assert!(start.elapsed() >= Duration::from_millis(300));
+    running.end();
+}
+
+#[cfg(unix)]
+mod local {
+    use super::*;
+    use std::fs::{File, OpenOptions};
+    use std::io::{BufRead, BufReader};
+    use std::os::unix::fs::FileExt;
+    use std::os::unix::net::UnixStream;
+    use std::path::Path;
+
+    /// A client of the local protocol.
+    struct Client {
+        stream: BufReader<UnixStream>,
+        buffer: File,
+    }
+
+    impl Client {
+        fn connect(socket: &Path) -> Self {
+            let stream = UnixStream::connect(socket).expect("connect");
+            stream.set_read_timeout(Some(Duration::from_secs(30))).expect("timeout");
+            let mut client = Self { stream: BufReader::new(stream), buffer: File::open("/dev/null").expect("null") };
+            let about: serde_json::Value = serde_json::from_str(&client.line()).expect("greeting");
+            assert_eq!((&about["width"], &about["height"]), (&WIDTH.into(), &HEIGHT.into()), "{about}");
+            assert_eq!(about["bytes"], 8 * WIDTH * HEIGHT);
+            let path = about["buffer"].as_str().expect("path");
+            client.buffer = OpenOptions::new().write(true).open(path).expect("buffer");
+            assert_eq!(client.ask("{\"mapped\": true}"), "{}\n");
+            assert!(!Path::new(path).exists(), "the buffer keeps a name");
+            client
+        }
+
+        fn line(&mut self) -> String {
+            let mut line = String::new();
+            self.stream.read_line(&mut line).expect("answer");
+            line
+        }
+
+        fn ask(&mut self, request: &str) -> String {
+            writeln!(self.stream.get_mut(), "{request}").expect("request");
+            self.line()
+        }
+
+        fn show(&mut self, bytes: &[u8], kind: &str) -> serde_json::Value {
+            self.buffer.write_all_at(bytes, 0).expect("buffer");
+            serde_json::from_str(&self.ask(kind)).expect("answer")
+        }
+    }
+
+    const LEVELS: &str = r#"{"show": "levels", "dtype": "uint8"}"#;
+    const PHASE: &str = r#"{"show": "phase", "dtype": "float32"}"#;
+
+    fn start(folder: &Path, connections: usize) -> (Panel, std::path::PathBuf) {
+        let socket = folder.join("panel.sock");
+        let settings = ServeSettings {
+            slmsuite: None,
+            slmpy: None,
+            local: Some(socket.clone()),
+            connections,
+            patience: Duration::from_secs(2),
+            ..ServeSettings::default()
+        };
+        (Panel::run(Server::start(panel(), &settings).expect("server")), socket)
+    }
+
+    #[test]
+    fn frames_cross_in_shared_memory_and_are_answered_with_their_time() {
+        let folder = tempfile::tempdir().expect("folder");
+        let (running, socket) = start(folder.path(), 8);
+        let mut client = Client::connect(&socket);
+        let before = holodrive::serve::monotonic_seconds(Instant::now()).expect("clock");
+        let told = client.show(&frame(1), LEVELS);
+        let after = holodrive::serve::monotonic_seconds(Instant::now()).expect("clock");
+        assert_eq!((&told["number"], &told["missed"]), (&1.into(), &0.into()), "{told}");
+        assert!(told["time"].as_f64().is_some_and(|time| (before..=after).contains(&time)), "{told}");
+        let phases: Vec<f32> = (0..WIDTH * HEIGHT).map(|i| i as f32 * 0.01).collect();
+        assert_eq!(client.show(bytemuck::cast_slice(&phases), PHASE)["number"], 2);
+        drop(client);
+        let (server, shown) = running.end();
+        assert_eq!(shown, [levels(&frame(1)), SentFrame::Values(phases)]);
+        drop(server);
+        assert_eq!(std::fs::read_dir(folder.path()).expect("list").count(), 0, "something was left behind");
+    }
+
+    #[test]
+    fn what_one_client_does_is_not_felt_by_another() {
+        let folder = tempfile::tempdir().expect("folder");
+        let (running, socket) = start(folder.path(), 8);
+        let mut good = Client::connect(&socket);
+        let mut number = 0;
+        let mut still = |good: &mut Client| {
+            number += 1;
+            assert_eq!(good.show(&frame(number), LEVELS)["number"], number);
+        };
+        still(&mut good);
+        // Answered, and the connection goes on.
+        let mut bad = Client::connect(&socket);
+        for wrong in ["{}", "[1]", "\u{7f}\u{0}", r#"{"show": "levels", "dtype": "float32"}"#, "", r#"{"show": 1}"#] {
+            assert!(bad.ask(wrong).contains("error"), "{wrong}");
+            still(&mut good);
+        }
+        assert!(bad.show(&frame(0), r#"{"show": "amplitude", "dtype": "float32"}"#)["error"].is_string());
+        // A file cut short under the server's hands.
+        bad.buffer.set_len(10).expect("cut");
+        assert!(bad.ask(LEVELS).contains("shared file"));
+        still(&mut good);
+        // A line without end.
+        writeln!(bad.stream.get_mut(), "{}", "x".repeat(100_000)).ok();
+        assert!(bad.line().contains("longer"));
+        still(&mut good);
+        // One that goes in the middle of a line, and one that goes before it has read anything.
+        let mut gone = Client::connect(&socket);
+        gone.stream.get_mut().write_all(b"{\"show").expect("half");
+        drop(gone);
+        drop(UnixStream::connect(&socket).expect("connect"));
+        // Silent in the middle of a line: cut off after its patience.
+        let mut slow = Client::connect(&socket);
+        slow.stream.get_mut().write_all(b"{\"show").expect("half");
+        assert!(slow.line().contains("in time"));
+        still(&mut good);
+        // More than may be connected: the silent ones go, the busy one stays.
+        let crowd: Vec<Client> = (0..20)
+            .map(|_| {
+                let guest = Client::connect(&socket);
+                still(&mut good);
+                guest
+            })
+            .collect();
+        still(&mut good);
+        drop(crowd);
+        let (_, shown) = running.end();
+        assert_eq!(shown, (1..=number).map(|number| levels(&frame(number))).collect::<Vec<_>>());
+        // Clients that were cut off may still be leaving; their files go with them.
+        let start = Instant::now();
+        while std::fs::read_dir(folder.path()).expect("list").count() > 0 {
+            assert!(start.elapsed() < Duration::from_secs(10), "something was left behind");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    #[test]
+    fn three_thousand_local_requests_a_tenth_of_them_garbage() {
+        let folder = tempfile::tempdir().expect("folder");
+        let (running, socket) = start(folder.path(), 8);
+        let mut client = Client::connect(&socket);
+        let (mut wanted, mut early) = (Vec::new(), None);
+        for number in 0..3_000u32 {
+            if number % 10 != 9 {
+                client.show(&frame(number), LEVELS);
+                wanted.push(levels(&frame(number)));
+            } else if number % 20 == 9 {
+                assert!(client.ask("{\"show\": \"levels\"").contains("error"));
+            } else {
+                // One that goes in the middle of its request.
+                let mut gone = Client::connect(&socket);
+                gone.stream.get_mut().write_all(b"{\"show\": ").expect("half");
+            }
+            if number == 600 {
+                early = resident();
+            }
+        }
+        let late = resident();
+        let (server, shown) = running.end();
+        assert!(shown == wanted, "frames were lost or made up");
+        assert_eq!(server.counts().frames, 2_700);
+        if let (Some(early), Some(late)) = (early, late) {
+            // The test itself keeps 2,160 frames twice, 1.5 kB each; other tests of this process are at work beside it.
+            assert!(late < early + 40_000_000, "memory grew by {} bytes", late - early);
+        }
+    }
+
+    #[test]
+    fn a_client_that_has_gone_is_known() {
+        let folder = tempfile::tempdir().expect("folder");
+        let socket = folder.path().join("panel.sock");
+        let free = Some("127.0.0.1:0".parse().expect("address"));
+        let settings = ServeSettings {
+            slmsuite: free,
+            slmpy: None,
+            local: Some(socket.clone()),
+            ..settings(Duration::from_secs(5))
+        };
+        let server = Server::start(panel(), &settings).expect("server");
+        let address = server.slmsuite().expect("address");
+        let (say, said) = std::sync::mpsc::channel();
+        let client = std::thread::spawn(move || {
+            let mut client = Client::connect(&socket);
+            client.show(&frame(1), LEVELS);
+            said.recv().expect("word");
+            drop(client);
+            ask(address, &request(&frame(2), HEIGHT))
+        });
+        let shown = server.next(Duration::from_secs(20)).expect("frame");
+        let number = shown.client().expect("a lasting client");
+        shown.shown(flip(1));
+        assert!(server.is_connected(number));
+        say.send(()).expect("client");
+        let next = server.next(Duration::from_secs(20)).expect("frame");
+        assert_eq!(next.client(), None, "slmsuite's clients do not last");
+        next.shown(flip(2));
+        client.join().expect("client");
+        let start = Instant::now();
+        while server.is_connected(number) {
+            assert!(start.elapsed() < Duration::from_secs(10), "it has gone");
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 }
 

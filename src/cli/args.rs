@@ -11,6 +11,7 @@ pub(crate) use super::scene_args::{
     ColorArgs, DepthArg, FormFactorArg, MirrorDepthArg, PhaseArg, PlacementArg, PlacementArgs, SceneArgs, Wavelengths,
     White,
 };
+pub(crate) use super::serve_args::{OnClientGoneArg, ServeArgs, ServedLevelsArg};
 
 const EXIT_CODES: &str = "\
 Exit codes: 0 done; 2 wrong flags, bad input, or a file or display that refused (one line says what, where and what to do; \
@@ -84,6 +85,14 @@ pub(crate) enum Command {
         after_help = "Examples:\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml --dry-run\n  holodrive print scenes/cornell.gltf --plate calib/plate-small.toml -o plate\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml -o plate --shard auto"
     )]
     Print(PrintArgs),
+    /// Keep a panel, and show on it what other programs send.
+    ///
+    /// Runs until Ctrl-C, or Esc on the panel. The first line says where clients come in (with --json: one line of JSON with
+    /// the ports that it got); the report comes at the end.
+    #[command(
+        after_help = "Examples:\n  holodrive serve --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive serve --panel generic --monitor none --slmsuite 0 --json\n  holodrive serve --panel mine.toml --monitor HDMI-1 --local --on-client-gone idle --idle flat.png\n  holodrive serve --write-python holodrive.py"
+    )]
+    Serve(ServeArgs),
     /// List the monitors, and which panel profile fits each.
     Monitors(MonitorsArgs),
     /// Look at everything on this desktop that alters levels on their way to a panel.

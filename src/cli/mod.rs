@@ -19,6 +19,8 @@ mod report;
 mod scene_args;
 #[cfg(feature = "display")]
 mod screen;
+mod serve;
+mod serve_args;
 mod show;
 mod subframes;
 
@@ -53,6 +55,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Bench { what } => bench::bench(&what),
         Command::Calibrate { what } => calibrate::calibrate(&what),
         Command::Print(args) => print::print(&args, json),
+        Command::Serve(args) => serve::serve(&args, json),
         Command::Monitors(args) => monitors::monitors(&args),
         Command::Doctor(args) => monitors::doctor(&args),
     };
@@ -72,7 +75,7 @@ fn one_line(refused: &clap::Error) -> String {
     let words = first.join(" ");
     let words = words.strip_prefix("error: ").unwrap_or(&words);
     if refused.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return "holodrive: a command is needed: points, compute, propagate, encode, reconstruct, show, print, calibrate, bench, monitors or doctor (see holodrive --help)".into();
+        return "holodrive: a command is needed: points, compute, propagate, encode, reconstruct, show, print, calibrate, bench, serve, monitors or doctor (see holodrive --help)".into();
     }
     format!("holodrive: {words} (see holodrive --help)")
 }

@@ -62,7 +62,9 @@ mod real {
         if let Some(path) = &args.card {
             let monitor = match &choice {
                 Some(choice) => choice.find(&monitors)?,
-                None => monitors.first().ok_or_else(|| Error::Display { what: "there is no monitor".into() })?,
+                None => {
+                    monitors.first().cloned().ok_or_else(|| Error::Display { what: "there is no monitor".into() })?
+                }
             };
             write_card(path, monitor.width, monitor.height)?;
             let line = format!("test card for {}: {}", monitor.name, path.display());

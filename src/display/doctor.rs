@@ -56,9 +56,13 @@ pub(super) struct Property {
 /// [`crate::Error::Display`] when the monitor is not there or the window system does not answer.
 pub fn examine(display: &mut Display, choice: Option<&MonitorChoice>) -> Result<Vec<Finding>> {
     let monitors = display.monitors()?;
-    let chosen: Vec<&Monitor> = match choice {
-        Some(choice) => vec![choice.find(&monitors)?],
-        None => monitors.iter().collect(),
+    let chosen: Vec<Monitor> = match choice {
+        // Of a region, the monitors that show it.
+        Some(choice) => match choice.find(&monitors)? {
+            Monitor { parts, .. } if !parts.is_empty() => parts,
+            monitor => vec![monitor],
+        },
+        None => monitors,
     };
     let x11 = display.x11();
     let screen = x11.as_ref().map(|x11| x11.screen()).transpose()?;
@@ -68,7 +72,7 @@ pub fn examine(display: &mut Display, choice: Option<&MonitorChoice>) -> Result<
             Some(x11) => x11.properties(&monitor.name)?,
             None => Vec::new(),
         };
-        findings.extend(judge_monitor(monitor, &properties));
+        findings.extend(judge_monitor(&monitor, &properties));
     }
     Ok(findings)
 }
@@ -76,8 +80,8 @@ pub fn examine(display: &mut Display, choice: Option<&MonitorChoice>) -> Result<
 fn judge_screen(screen: Option<&Screen>) -> Vec<Finding> {
     let finding = |subject, severity, what: String| Finding { monitor: None, subject, severity, what };
     let Some(screen) = screen else {
-        let what = "not X11: gamma, rotation and colour settings of the graphics card cannot be read; check the panel \
-                    with the test card";
+        let what = "not X11: gamma and colour settings of the graphics card cannot be read; check the panel with the test \
+                    card";
         return vec![finding("window system", Severity::Unknown, what.into())];
     };
     let depth = match screen.depth {
@@ -277,6 +281,7 @@ mod tests {
                 shared_with: Vec::new(),
                 preferred: None,
             }),
+            parts: Vec::new(),
         }
     }
 

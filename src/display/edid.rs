@@ -154,7 +154,7 @@ fn declares_hdmi(block: &[u8]) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
 
@@ -174,7 +174,7 @@ mod tests {
     }
 
     /// A 1920×1080 panel, laid out byte by byte as the standard's own example does.
-    fn pluto() -> Vec<u8> {
+    pub(in super::super) fn pluto() -> Vec<u8> {
         let mut block = vec![0; BLOCK];
         block[..8].copy_from_slice(&HEADER);
         // H=8, O=15, E=5: 01000 01111 00101.

@@ -49,6 +49,11 @@ impl DisplayFrame {
         &self.pixels
     }
 
+    /// The pixels, to be drawn into.
+    pub(super) fn pixels_mut(&mut self) -> &mut [[u8; 3]] {
+        &mut self.pixels
+    }
+
     fn check(width: u32, height: u32, given: usize) -> Result<()> {
         if width == 0 || height == 0 {
             return Err(Error::parameter("frame", format!("{width}x{height} px has no pixels")));

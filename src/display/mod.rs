@@ -2,7 +2,7 @@
 //!
 //! [`Display`] is the connection to the window system. [`Display::monitors`] lists what there is; [`MonitorChoice`]
 //! names one by connector, EDID, serial number or place. [`PanelWindow`] covers one monitor exactly and keeps it so;
-//! [`show`] does the whole for one frame, [`play`] for a sequence of them, [`serve`] for what other programs
+//! [`show`] does the whole for one frame, [`play`] for a sequence of them; [`ServedWindow`] is for what other programs
 //! send.
 //! [`examine`] looks at everything that is known to spoil levels, and [`test_card`] shows it to an eye.
 //!
@@ -15,19 +15,25 @@
 //! behind the frame buffer (limited-range RGB, dithering in the card's output stage, overscan in the monitor) cannot
 //! be seen from here.
 //!
-//! On X11 all of this is checked. On Wayland and other systems, what winit tells is.
+//! On X11 all of this is checked. On Wayland size, scale and rotation are; gamma tables and what else alters colours cannot
+//! be asked for. On other systems, what winit tells is checked.
 
 mod doctor;
 mod edid;
 mod frame;
+mod kernel;
 mod monitor;
 mod play;
 mod presenter;
+mod region;
 mod serving;
 mod session;
 mod show;
 mod test_card;
+mod trigger;
 mod vblank;
+#[cfg(all(unix, not(any(target_vendor = "apple", target_os = "android"))))]
+mod wayland;
 mod window;
 mod x11;
 
@@ -37,8 +43,9 @@ pub use frame::DisplayFrame;
 pub use monitor::{Gamma, Monitor, MonitorChoice, ScanOut};
 pub use play::{FrameTime, PlayReport, PlaySettings, play};
 pub use presenter::Presenter;
-pub use serving::{ServingReport, serve};
+pub use serving::ServedWindow;
 pub use session::Display;
 pub use show::{OnAbsence, ShowEnd, ShowReport, ShowSettings, show};
 pub use test_card::test_card;
+pub use trigger::TriggerPatch;
 pub use window::{PanelWindow, Presented, Standing, WindowSettings};

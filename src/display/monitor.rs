@@ -1,6 +1,8 @@
 //! Monitors: what they are, how one is named by the user, and what would spoil levels on the way to it.
 
 use super::edid::Edid;
+use super::region;
+use super::x11::Rectangle;
 use crate::error::{Error, Result};
 use serde::Serialize;
 use std::fmt;
@@ -29,8 +31,11 @@ pub struct Monitor {
     pub primary: bool,
     /// What the monitor says about itself, where it can be had.
     pub edid: Option<Edid>,
-    /// What happens between frame buffer and cable, where the system tells (X11).
+    /// What happens between frame buffer and cable, where the system tells (X11; of rotation, Wayland).
     pub scan_out: Option<ScanOut>,
+    /// The monitors that show it, where it is a region of the desktop and not one of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<Monitor>,
 }
 
 /// What the graphics card does to pixels on their way from the frame buffer to the cable.
@@ -88,6 +93,9 @@ impl Gamma {
 impl Monitor {
     /// Everything known that would keep levels from reaching this monitor unchanged, each with its remedy.
     pub fn faults(&self) -> Vec<String> {
+        if !self.parts.is_empty() {
+            return self.parts.iter().flat_map(Self::faults).collect();
+        }
         let mut faults = Vec::new();
         let name = &self.name;
         if self.scale != 1.0 {
@@ -96,7 +104,8 @@ impl Monitor {
         let Some(scan_out) = &self.scan_out else { return faults };
         if scan_out.rotated {
             faults.push(format!(
-                "{name} is rotated or mirrored; turn that off (xrandr --output {name} --rotate normal --reflect normal)"
+                "{name} is rotated or mirrored; turn that off in the desktop's settings (on X11: xrandr --output {name} --rotate \
+                 normal --reflect normal)"
             ));
         }
         if scan_out.transformed {
@@ -122,6 +131,17 @@ impl Monitor {
     /// Whether it stands at the same place with the same size: a window made for `other` still fits.
     pub fn same_place(&self, other: &Self) -> bool {
         (self.x, self.y, self.width, self.height) == (other.x, other.y, other.width, other.height)
+    }
+
+    /// The monitor that `self` was, among those that are there now: same connector, same EDID, though perhaps at another
+    /// place. A region is again there when all monitors that showed it show it.
+    pub(super) fn again(&self, monitors: &[Self]) -> Option<Self> {
+        if self.parts.is_empty() {
+            return monitors.iter().find(|now| now.name == self.name && now.edid == self.edid).cloned();
+        }
+        let now = region::joined(Rectangle::of(self), monitors).ok()?;
+        (now.parts.len() == self.parts.len() && self.parts.iter().all(|part| part.again(&now.parts).is_some()))
+            .then_some(now)
     }
 }
 
@@ -153,6 +173,19 @@ pub enum MonitorChoice {
     Index(usize),
     /// By its top left corner on the desktop [px]: `at:1920,0`.
     Position(i32, i32),
+    /// No monitor, but a rectangle of the desktop [px], on one monitor or over several: `region:1920,0,3840,1080`.
+    Region {
+        /// Left edge.
+        x: i32,
+        /// Top edge.
+        y: i32,
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// The rectangle that several monitors make together, by connector: `DP-1+DP-2`.
+    Joined(Vec<String>),
 }
 
 impl FromStr for MonitorChoice {
@@ -171,6 +204,21 @@ impl FromStr for MonitorChoice {
                 .split_once(',')
                 .and_then(|(x, y)| Some(Self::Position(x.trim().parse().ok()?, y.trim().parse().ok()?)))
                 .ok_or_else(|| wrong("a place on the desktop, such as at:1920,0")),
+            Some(("region", place)) => {
+                let expected = "a rectangle of the desktop, such as region:1920,0,3840,1080";
+                let numbers: Vec<i32> = place.split(',').map_while(|word| word.trim().parse().ok()).collect();
+                let sides = |w: i32, h: i32| Some((u32::try_from(w).ok()?, u32::try_from(h).ok()?));
+                match (numbers.as_slice(), place.split(',').count()) {
+                    (&[x, y, w, h], 4) => match sides(w, h) {
+                        Some((width, height)) if width > 0 && height > 0 => Ok(Self::Region { x, y, width, height }),
+                        _ => Err(wrong(expected)),
+                    },
+                    _ => Err(wrong(expected)),
+                }
+            }
+            None if text.contains('+') && text.split('+').all(|name| !name.trim().is_empty()) => {
+                Ok(Self::Joined(text.split('+').map(|name| name.trim().to_owned()).collect()))
+            }
             _ if text.is_empty() || matches!(text, "edid:" | "serial:") => {
                 Err(wrong("a monitor: give its connector, edid:NAME, serial:NUMBER, index:N or at:X,Y"))
             }
@@ -187,24 +235,41 @@ impl fmt::Display for MonitorChoice {
             Self::Serial(serial) => write!(f, "serial:{serial}"),
             Self::Index(index) => write!(f, "index:{index}"),
             Self::Position(x, y) => write!(f, "at:{x},{y}"),
+            Self::Region { x, y, width, height } => write!(f, "region:{x},{y},{width},{height}"),
+            Self::Joined(names) => write!(f, "{}", names.join("+")),
         }
     }
 }
 
 impl MonitorChoice {
-    /// The one monitor that is meant.
+    /// The one monitor that is meant; a region as if it were one ([`Monitor::parts`]).
     ///
     /// # Errors
     ///
-    /// [`Error::Display`] when no monitor or more than one answers; it lists those there are.
-    pub fn find<'a>(&self, monitors: &'a [Monitor]) -> Result<&'a Monitor> {
+    /// [`Error::Display`] when no monitor or more than one answers, or a part of the region is on none; it lists those there
+    /// are.
+    pub fn find(&self, monitors: &[Monitor]) -> Result<Monitor> {
+        match self {
+            Self::Region { x, y, width, height } => {
+                let region = Rectangle { x: *x, y: *y, width: *width, height: *height };
+                return region::joined(region, monitors);
+            }
+            Self::Joined(names) => {
+                let parts: Vec<Monitor> =
+                    names.iter().map(|name| Self::Connector(name.clone()).find(monitors)).collect::<Result<_>>()?;
+                let region = region::about(&parts.iter().collect::<Vec<_>>());
+                let region = region.ok_or_else(|| Error::Display { what: format!("{self} is too large") })?;
+                return region::joined(region, monitors);
+            }
+            _ => {}
+        }
         let mut meant = monitors.iter().filter(|monitor| self.means(monitor));
         let list = || {
             let names: Vec<String> = monitors.iter().map(ToString::to_string).collect();
             if names.is_empty() { "none".to_owned() } else { names.join("; ") }
         };
         match (meant.next(), meant.next()) {
-            (Some(monitor), None) => Ok(monitor),
+            (Some(monitor), None) => Ok(monitor.clone()),
             (None, _) => Err(Error::Display { what: format!("no monitor \"{self}\"; there are: {}", list()) }),
             (Some(_), Some(_)) => Err(Error::Display {
                 what: format!(
@@ -228,6 +293,8 @@ impl MonitorChoice {
             }),
             Self::Index(index) => *index == monitor.index,
             Self::Position(x, y) => (*x, *y) == (monitor.x, monitor.y),
+            // Not one monitor.
+            Self::Region { .. } | Self::Joined(_) => false,
         }
     }
 }
@@ -268,6 +335,7 @@ mod tests {
             primary: index == 0,
             edid,
             scan_out,
+            parts: Vec::new(),
         }
     }
 
@@ -295,6 +363,8 @@ mod tests {
             ("serial:8001", 3),
             ("index:1", 1),
             ("at:5760,0", 3),
+            ("region:1920,0,3840,1080", 1),
+            ("HDMI-2+HDMI-3", 2),
         ] {
             assert_eq!(found(text).expect(text), index, "{text}");
         }
@@ -311,7 +381,21 @@ mod tests {
 
     #[test]
     fn malformed_choices_are_refused() {
-        for text in ["", "edid:", "serial: ", "index:-1", "index:x", "at:1920", "at:a,b"] {
+        for text in [
+            "",
+            "edid:",
+            "serial: ",
+            "index:-1",
+            "index:x",
+            "at:1920",
+            "at:a,b",
+            "region:",
+            "region:1,2,3",
+            "region:1,2,3,0",
+            "region:1,2,-3,4",
+            "region:1,2,3,4,5",
+            "region:0,0,a,4",
+        ] {
             let refused = text.parse::<MonitorChoice>();
             assert!(matches!(refused, Err(Error::Parameter { .. })), "{text}: {refused:?}");
         }

@@ -1,6 +1,7 @@
 //! The connection to the window system, and the turning of its events.
 
-use super::monitor::Monitor;
+use super::kernel;
+use super::monitor::{Gamma, Monitor, ScanOut};
 use super::x11::X11;
 use crate::error::{Error, Result};
 use std::cell::RefCell;
@@ -28,6 +29,8 @@ pub struct Display {
     event_loop: EventLoop<()>,
     windows: HashMap<WindowId, Weak<RefCell<Inbox>>>,
     x11: Option<Rc<X11>>,
+    #[cfg(all(unix, not(any(target_vendor = "apple", target_os = "android"))))]
+    wayland: Option<super::wayland::Wayland>,
 }
 
 /// What has happened to one window and was not yet dealt with.
@@ -73,12 +76,22 @@ impl Display {
                 "no display server can be reached: {error}; run inside a desktop session, or set DISPLAY or WAYLAND_DISPLAY"
             ),
         })?;
-        let on_x11 = event_loop
-            .owned_display_handle()
-            .display_handle()
-            .is_ok_and(|handle| matches!(handle.as_raw(), RawDisplayHandle::Xlib(_)));
+        let owned = event_loop.owned_display_handle();
+        let system = owned.display_handle().ok().map(|handle| handle.as_raw());
+        let on_x11 = matches!(system, Some(RawDisplayHandle::Xlib(_)));
         let x11 = if on_x11 { Some(Rc::new(X11::connect()?)) } else { None };
-        Ok(Self { event_loop, windows: HashMap::new(), x11 })
+        #[cfg(all(unix, not(any(target_vendor = "apple", target_os = "android"))))]
+        let wayland = match system {
+            Some(RawDisplayHandle::Wayland(_)) => Some(super::wayland::Wayland::connect()?),
+            _ => None,
+        };
+        Ok(Self {
+            event_loop,
+            windows: HashMap::new(),
+            x11,
+            #[cfg(all(unix, not(any(target_vendor = "apple", target_os = "android"))))]
+            wayland,
+        })
     }
 
     /// The monitors of the desktop, as they are now.
@@ -86,23 +99,62 @@ impl Display {
         if let Some(x11) = &self.x11 {
             return x11.monitors();
         }
-        self.with_event_loop(|event_loop| {
+        let mut monitors: Vec<Monitor> = self.with_event_loop(|event_loop| {
             let primary = event_loop.primary_monitor();
             let handles = event_loop.available_monitors().enumerate();
             handles.map(|(index, handle)| monitor_of(index, &handle, primary.as_ref() == Some(&handle))).collect()
-        })
+        })?;
+        self.add_scan_out(&mut monitors)?;
+        Ok(monitors)
+    }
+
+    /// Adds what the compositor tells of its monitors' scan-out.
+    #[cfg(all(unix, not(any(target_vendor = "apple", target_os = "android"))))]
+    fn add_scan_out(&mut self, monitors: &mut [Monitor]) -> Result<()> {
+        let Some(wayland) = &mut self.wayland else { return Ok(()) };
+        let changed = wayland.changes()?;
+        for monitor in monitors {
+            monitor.scan_out = wayland.scan_out(&monitor.name).map(|(rotated, preferred)| ScanOut {
+                rotated,
+                transformed: false,
+                gamma: Gamma::Unknown,
+                // A fullscreen window is on one monitor, wherever the others lie.
+                shared_with: Vec::new(),
+                preferred,
+            });
+        }
+        if changed {
+            self.tell(true, false);
+        }
+        Ok(())
+    }
+
+    #[cfg(not(all(unix, not(any(target_vendor = "apple", target_os = "android")))))]
+    fn add_scan_out(&mut self, _: &mut [Monitor]) -> Result<()> {
+        Ok(())
+    }
+
+    /// Lets all windows know what has changed.
+    fn tell(&mut self, monitors: bool, windows: bool) {
+        self.windows.retain(|_, window| window.strong_count() > 0);
+        for inbox in self.windows.values().filter_map(Weak::upgrade) {
+            let mut inbox = inbox.borrow_mut();
+            inbox.monitors_changed |= monitors;
+            inbox.windows_changed |= windows;
+        }
     }
 
     /// Deals with what the window system has sent; waits up to `timeout` for something to come.
     pub fn turn(&mut self, timeout: Duration) -> Result<()> {
         self.pump(timeout, &mut Handler { windows: &self.windows.clone(), action: None::<fn(&ActiveEventLoop)> })?;
-        let Some(x11) = &self.x11 else { return Ok(()) };
-        let changes = x11.changes()?;
-        self.windows.retain(|_, window| window.strong_count() > 0);
-        for inbox in self.windows.values().filter_map(Weak::upgrade) {
-            let mut inbox = inbox.borrow_mut();
-            inbox.monitors_changed |= changes.monitors;
-            inbox.windows_changed |= changes.windows;
+        #[cfg(all(unix, not(any(target_vendor = "apple", target_os = "android"))))]
+        if let Some(wayland) = &mut self.wayland {
+            let changed = wayland.changes()?;
+            self.tell(changed, false);
+        }
+        if let Some(x11) = &self.x11 {
+            let changes = x11.changes()?;
+            self.tell(changes.monitors, changes.windows);
         }
         Ok(())
     }
@@ -144,12 +196,14 @@ impl Display {
     }
 }
 
-/// A monitor as winit describes it; it knows neither EDID nor scan-out.
+/// A monitor as winit describes it, with its EDID from the kernel; neither knows its scan-out.
 fn monitor_of(index: usize, handle: &MonitorHandle, primary: bool) -> Monitor {
     let (size, position) = (handle.size(), handle.position());
+    let name = handle.name().unwrap_or_else(|| format!("monitor-{index}"));
     Monitor {
         index,
-        name: handle.name().unwrap_or_else(|| format!("monitor-{index}")),
+        edid: kernel::edid(&name, (size.width, size.height)),
+        name,
         width: size.width,
         height: size.height,
         x: position.x,
@@ -157,8 +211,8 @@ fn monitor_of(index: usize, handle: &MonitorHandle, primary: bool) -> Monitor {
         refresh: handle.refresh_rate_millihertz().map(|rate| f64::from(rate) / 1e3),
         scale: handle.scale_factor(),
         primary,
-        edid: None,
         scan_out: None,
+        parts: Vec::new(),
     }
 }
 

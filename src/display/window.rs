@@ -4,6 +4,7 @@ use super::frame::DisplayFrame;
 use super::monitor::{Monitor, MonitorChoice};
 use super::presenter::{Presenter, Surface};
 use super::session::{Display, Inbox};
+use super::trigger::TriggerPatch;
 use super::vblank::VerticalBlank;
 use super::x11::{Rectangle, X11};
 use crate::error::{Error, Result};
@@ -33,11 +34,13 @@ pub struct WindowSettings {
     pub exact: bool,
     /// Whether the window takes the keyboard, so that Esc, Q or Ctrl+C in it ends the show.
     pub take_keyboard: bool,
+    /// A corner that toggles with every frame, if one should.
+    pub trigger: Option<TriggerPatch>,
 }
 
 impl Default for WindowSettings {
     fn default() -> Self {
-        Self { presenter: Presenter::Auto, exact: true, take_keyboard: true }
+        Self { presenter: Presenter::Auto, exact: true, take_keyboard: true, trigger: None }
     }
 }
 
@@ -109,13 +112,14 @@ impl PanelWindow {
         settings: &WindowSettings,
     ) -> Result<Self> {
         let monitors = display.monitors()?;
-        let monitor = choice.find(&monitors)?.clone();
-        let (open, warnings) = Open::new(display, &monitor, first, settings)?;
+        let monitor = choice.find(&monitors)?;
+        let first = marked(first, settings.trigger, 0)?;
+        let (open, warnings) = Open::new(display, &monitor, &first, settings)?;
         Ok(Self {
             open: Some(open),
             monitor,
             settings: settings.clone(),
-            last: Arc::clone(first),
+            last: first,
             frames: 1,
             covered: 0,
             absent: None,
@@ -159,18 +163,19 @@ impl PanelWindow {
     ///
     /// [`Error::Display`] when the frame is not of the monitor's size, or the window system refuses it.
     pub fn present(&mut self, frame: &Arc<DisplayFrame>) -> Result<Presented> {
+        let frame = marked(frame, self.settings.trigger, self.frames)?;
         let taken = match &mut self.open {
             Some(open) => {
-                let taken = open.surface.present(frame)?;
+                let taken = open.surface.present(&frame)?;
                 open.forget_background()?;
                 taken
             }
             None => {
-                check_size(frame, &self.monitor)?;
+                check_size(&frame, &self.monitor)?;
                 false
             }
         };
-        self.last = Arc::clone(frame);
+        self.last = frame;
         self.frames += 1;
         Ok(Presented { number: self.frames - 1, at: Instant::now(), taken })
     }
@@ -228,7 +233,7 @@ impl PanelWindow {
     fn misplaced(&self, display: &mut Display) -> Result<Option<String>> {
         let name = &self.monitor.name;
         let monitors = display.monitors()?;
-        let Some(now) = monitors.iter().find(|monitor| is_again(monitor, &self.monitor)) else {
+        let Some(now) = self.monitor.again(&monitors) else {
             return Ok(Some(format!("monitor {name} is gone")));
         };
         if !now.same_place(&self.monitor) {
@@ -247,10 +252,8 @@ impl PanelWindow {
         let why = self.absent.clone().unwrap_or_default();
         let monitors = display.monitors()?;
         let size = (self.monitor.width, self.monitor.height);
-        let back = monitors.into_iter().find(|monitor| {
-            is_again(monitor, &self.monitor)
-                && (monitor.width, monitor.height) == size
-                && (!self.settings.exact || monitor.faults().is_empty())
+        let back = self.monitor.again(&monitors).filter(|monitor| {
+            (monitor.width, monitor.height) == size && (!self.settings.exact || monitor.faults().is_empty())
         });
         let Some(monitor) = back else { return Ok(Standing::Absent { why }) };
         match Open::new(display, &monitor, &self.last, &self.settings) {
@@ -281,6 +284,11 @@ impl Open {
             return Err(Error::Display { what: faults.join("; ") });
         }
         let on_x11 = display.x11().is_some();
+        if !on_x11 && !monitor.parts.is_empty() {
+            let what =
+                "a region of the desktop, or several monitors at once, can be covered on X11 only; name one monitor";
+            return Err(Error::Display { what: what.into() });
+        }
         let window = display.with_event_loop(|event_loop| create(event_loop, monitor, on_x11))??;
         let inbox = Rc::new(RefCell::new(Inbox::of_size(monitor.width, monitor.height)));
         display.watch(window.id(), &inbox);
@@ -436,7 +444,10 @@ fn check_size(frame: &DisplayFrame, monitor: &Monitor) -> Result<()> {
     })
 }
 
-/// Whether `now` is the monitor that `before` was: same connector, same EDID.
-fn is_again(now: &Monitor, before: &Monitor) -> bool {
-    now.name == before.name && now.edid == before.edid
+/// The frame with the corner that tells its number, where one is asked for.
+fn marked(frame: &Arc<DisplayFrame>, trigger: Option<TriggerPatch>, number: u64) -> Result<Arc<DisplayFrame>> {
+    let Some(trigger) = trigger else { return Ok(Arc::clone(frame)) };
+    let mut marked = DisplayFrame::clone(frame);
+    trigger.draw(&mut marked, number)?;
+    Ok(Arc::new(marked))
 }

@@ -7,6 +7,7 @@
 use super::doctor::{Property, Screen};
 use super::edid::Edid;
 use super::frame::DisplayFrame;
+use super::kernel;
 use super::monitor::{Gamma, Monitor, ScanOut};
 use crate::error::{Error, Result};
 use std::fmt;
@@ -75,7 +76,7 @@ impl Rectangle {
         Self { x: crtc.x.into(), y: crtc.y.into(), width: crtc.width.into(), height: crtc.height.into() }
     }
 
-    fn meets(&self, other: &Self) -> bool {
+    pub(super) fn meets(&self, other: &Self) -> bool {
         let apart = |a: i32, a_size: u32, b: i32, b_size: u32| {
             i64::from(a) + i64::from(a_size) <= i64::from(b) || i64::from(b) + i64::from(b_size) <= i64::from(a)
         };
@@ -137,7 +138,7 @@ impl X11 {
                 refresh: mode(one.crtc.mode).and_then(refresh),
                 scale: 1.0,
                 primary: one.output == primary,
-                edid: self.edid(one.output)?,
+                edid: self.edid(one.output)?.or_else(|| kernel::edid(&one.name, (place.width, place.height))),
                 scan_out: Some(ScanOut {
                     rotated: one.crtc.rotation != randr::Rotation::ROTATE0,
                     transformed: self.transformed(one.info.crtc)?,
@@ -147,6 +148,7 @@ impl X11 {
                         .and_then(|id| mode(*id))
                         .map(|mode| (u32::from(mode.width), u32::from(mode.height))),
                 }),
+                parts: Vec::new(),
             });
         }
         Ok(monitors)

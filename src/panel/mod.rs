@@ -12,6 +12,7 @@ pub mod calibration;
 pub mod drive;
 pub mod frame;
 mod frame_file;
+mod nearest_table;
 pub mod packing;
 pub mod profile;
 mod profile_file;
@@ -24,6 +25,7 @@ pub mod wavefront;
 
 pub use drive::{Driven, Pattern, correct, drive};
 pub use frame::{Applied, EncodingRecord, Frame, FrameMetadata, Illumination, Origin};
+pub use nearest_table::NearestTable;
 pub use packing::{Packing, SignalLayout, VideoFrame};
 pub use profile::{CorrectionFile, PanelKind, PanelProfile};
 pub use regional::PixelCurve;

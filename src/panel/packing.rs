@@ -3,6 +3,7 @@
 
 use super::frame::{Frame, FrameMetadata};
 use crate::error::{Error, Result};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// How a level is laid into the three bytes of a video pixel.
@@ -198,18 +199,37 @@ impl SignalLayout {
         }
         let mut rgb = vec![0; 3 * self.width * self.height];
         let cells = self.packing.cells();
-        for slot in 0..slots {
-            let frame = frames[slot % frames.len()];
-            for (i, &level) in frame.levels.iter().enumerate() {
-                for cell in 0..cells * cells {
-                    let at = self.at(size, (i % size.0, i / size.0), (cell % cells, cell / cells));
-                    self.packing.put(&mut rgb[at..at + 3], level, slot, cell);
-                }
+        // Signal rows in parallel: a frame must be packed between two refreshes.
+        let rows = rgb.par_chunks_mut(3 * self.width).skip(self.row_offset).take(size.1 * cells).enumerate();
+        rows.for_each(|(signal_row, rgb)| {
+            let row = signal_row / cells;
+            let row = if self.flip_y { size.1 - 1 - row } else { row };
+            for slot in 0..slots {
+                let levels = &frames[slot % frames.len()].levels[row * size.0..(row + 1) * size.0];
+                self.pack_row(levels, slot, signal_row % cells, rgb);
             }
-        }
+        });
         let mut metadata = first.metadata.clone();
         metadata.applied.packing = Some(self.packing.name().into());
         Ok(VideoFrame { width: self.width, height: self.height, rgb, metadata })
+    }
+
+    /// Lays a row of levels into row `cell_y` of its cells, in a row of the signal.
+    fn pack_row(&self, levels: &[u16], slot: usize, cell_y: usize, rgb: &mut [u8]) {
+        let cells = self.packing.cells();
+        let rgb = &mut rgb[3 * self.column_offset..3 * (self.column_offset + levels.len() * cells)];
+        let pixels = rgb.chunks_exact_mut(3 * cells);
+        let put = |pixel: &mut [u8], level: u16| {
+            for (cell_x, rgb) in pixel.chunks_exact_mut(3).enumerate() {
+                self.packing.put(rgb, level, slot, cell_y * cells + cell_x);
+            }
+        };
+        match (self.packing, self.flip_x) {
+            // The most common one, without the detours of the others.
+            (Packing::Gray, false) => pixels.zip(levels).for_each(|(pixel, &level)| pixel.fill(level as u8)),
+            (_, false) => pixels.zip(levels).for_each(|(pixel, &level)| put(pixel, level)),
+            (_, true) => pixels.zip(levels.iter().rev()).for_each(|(pixel, &level)| put(pixel, level)),
+        }
     }
 
     /// Levels of frame `slot` that a video frame carries, `width × height` of them.

@@ -1,25 +1,41 @@
-//! Frames from other programs: a server that speaks slmsuite's and slmPy's protocols.
+//! Frames from other programs: a server that speaks slmsuite's and slmPy's protocols, and one of its own for programs on
+//! the same machine ([`local`]; Python's side of it is `holodrive.py` beside this file, [`PYTHON`]).
 //!
-//! The server only takes frames and answers; whoever runs it owns the panel, takes each frame by [`Server::next`], shows
-//! it, and says so by [`FrameRequest::shown`], upon which the client gets its answer. So the same server stands before
-//! a real panel and a simulated one.
+//! [`Server`] only takes frames and answers; whoever runs it owns the panel, takes each frame by [`Server::next`], shows
+//! it, and says so by [`FrameRequest::shown`], upon which the client gets its answer. [`keep`] is that for any [`Output`],
+//! so that the same server stands before a real panel and a simulated one ([`SimulatedOutput`]).
 //!
-//! Neither protocol is encrypted or authenticated: an address other than loopback lets the whole network write on the
-//! panel. Whatever a client sends, nothing is held that is longer than a frame of the panel can be; silent clients are cut
-//! off inside a request, and the longest silent one when there are too many.
+//! slmsuite's and slmPy's protocols are neither encrypted nor authenticated: an address other than loopback lets the whole
+//! network write on the panel. Whatever a client sends, nothing is held that is longer than a frame of the panel can be;
+//! silent clients are cut off inside a request, and the longest silent one when there are too many.
 
+mod clock;
 mod connections;
+mod conversation;
 mod encoding;
+mod keeping;
+#[cfg(unix)]
+pub mod local;
+mod output;
 mod slmpy;
 mod slmsuite;
+mod stream;
 
+pub use clock::monotonic_seconds;
 pub use connections::Server;
+pub use keeping::{Driver, KeepReport, KeepSettings, Latency, OnClientGone, keep};
+pub use output::{Output, Readiness, ShownAt, SimulatedOutput};
 
+use crate::panel::Modulation;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::SyncSender;
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// The Python module that speaks the local protocol, as text.
+pub const PYTHON: &str = include_str!("holodrive.py");
 
 /// What clients are told of the panel that is served.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +48,8 @@ pub struct ServedPanel {
     pub height: u32,
     /// Bits of a drive level, 1 to 16.
     pub bits: u8,
+    /// What it modulates.
+    pub modulation: Modulation,
     /// Distance between pixels across and down [m].
     pub pixel_pitch: [f64; 2],
     /// The wavelength in use [m].
@@ -42,15 +60,13 @@ pub struct ServedPanel {
     pub settle_time: f64,
 }
 
-/// Drive levels as a client sent them: final ones, to be packed and shown as they are.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SentLevels {
-    /// Columns [px].
-    pub width: u32,
-    /// Rows [px].
-    pub height: u32,
-    /// The levels, row-major, row 0 on top; each below 2^bits of the panel.
-    pub levels: Vec<u16>,
+/// A frame as a client sent it: of the panel's size, row-major, row 0 on top.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SentFrame {
+    /// Final drive levels, each below 2^bits of the panel: to be packed and shown as they are.
+    Levels(Vec<u16>),
+    /// Phases [rad] or, on an amplitude panel, amplitude transmittances: to go through correction and level curve.
+    Values(Vec<f32>),
 }
 
 /// Where and how the server listens.
@@ -60,6 +76,12 @@ pub struct ServeSettings {
     pub slmsuite: Option<SocketAddr>,
     /// Address for slmPy's protocol, if it is to be spoken. Port 0: a free one.
     pub slmpy: Option<SocketAddr>,
+    /// Socket for the local protocol, if it is to be spoken.
+    pub local: Option<PathBuf>,
+    /// Whether slmsuite's levels stand for phases that the panel's correction and curve are still to be applied to.
+    pub calibrated: bool,
+    /// Time after a frame's flip at which it is answered: none, or the panel's settle time.
+    pub settle: Duration,
     /// Most clients connected at once; the longest silent one makes room for one more.
     pub connections: usize,
     /// Longest silence inside a request, and longest time for the panel to show a frame.
@@ -67,10 +89,18 @@ pub struct ServeSettings {
 }
 
 impl Default for ServeSettings {
-    /// Both protocols on their usual ports, on loopback.
+    /// slmsuite's and slmPy's protocols on their usual ports, on loopback; final levels, answered at the flip.
     fn default() -> Self {
         let loopback = |port| Some(SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), port));
-        Self { slmsuite: loopback(5025), slmpy: loopback(9999), connections: 32, patience: Duration::from_secs(5) }
+        Self {
+            slmsuite: loopback(5025),
+            slmpy: loopback(9999),
+            local: None,
+            calibrated: false,
+            settle: Duration::ZERO,
+            connections: 32,
+            patience: Duration::from_secs(5),
+        }
     }
 }
 
@@ -85,31 +115,59 @@ pub struct ServeCounts {
     pub refused: u64,
 }
 
+/// When and how a frame came on the panel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Flip {
+    /// When it was handed over for the panel's next refresh.
+    pub at: Instant,
+    /// Running number of the frame on its panel; the idle frame is 0.
+    pub number: u64,
+    /// Refreshes that went by between its arrival and its flip, beside the one that every frame waits for.
+    pub missed: u64,
+}
+
 /// A frame that a client wants shown; it waits for the answer.
 #[derive(Debug)]
 pub struct FrameRequest {
-    levels: SentLevels,
-    from: SocketAddr,
-    answer: SyncSender<Result<(), String>>,
+    frame: SentFrame,
+    arrived: Instant,
+    from: String,
+    client: Option<u64>,
+    answer: SyncSender<Result<Flip, String>>,
     /// Set once the client was told that it has waited too long.
     abandoned: Arc<AtomicBool>,
 }
 
 impl FrameRequest {
-    /// The levels.
-    pub fn levels(&self) -> &SentLevels {
-        &self.levels
+    /// The frame.
+    pub fn frame(&self) -> &SentFrame {
+        &self.frame
     }
 
-    /// Who sent it.
-    pub fn from(&self) -> SocketAddr {
-        self.from
+    /// The frame, out of the request: an empty one stays in it.
+    pub fn take_frame(&mut self) -> SentFrame {
+        std::mem::replace(&mut self.frame, SentFrame::Levels(Vec::new()))
+    }
+
+    /// When all of it had come.
+    pub fn arrived(&self) -> Instant {
+        self.arrived
+    }
+
+    /// Who sent it: an address of the network, or `local`.
+    pub fn from(&self) -> &str {
+        &self.from
+    }
+
+    /// The number of its client, where a client stays connected after its frame (slmPy's and the local protocol).
+    pub fn client(&self) -> Option<u64> {
+        self.client
     }
 
     /// Tells the client that the frame is on the panel.
-    pub fn shown(self) {
+    pub fn shown(self, flip: Flip) {
         // A client that has gone needs no answer.
-        let _ = self.answer.send(Ok(()));
+        let _ = self.answer.send(Ok(flip));
     }
 
     /// Tells the client why it is not.
@@ -124,11 +182,11 @@ impl ServedPanel {
     }
 
     /// Levels of the panel's size and range.
-    fn take(&self, levels: Vec<u16>) -> Result<SentLevels, String> {
+    fn take(&self, levels: Vec<u16>) -> Result<SentFrame, String> {
         let limit = 1u32 << self.bits;
         match levels.iter().find(|&&level| u32::from(level) >= limit) {
             Some(level) => Err(format!("Level {level} is above {}, the panel's highest.", limit - 1)),
-            None => Ok(SentLevels { width: self.width, height: self.height, levels }),
+            None => Ok(SentFrame::Levels(levels)),
         }
     }
 }

@@ -1,9 +1,9 @@
 //! slmPy's protocol: in one connection, for each frame its length (32 bits, little-endian) and the frame: rows of 8-bit levels,
 //! raw, or compressed by zlib or gzip. The answer is `done` or `err`.
 //!
-//! slmPy can compress by bzip2 too; such frames are answered `err`.
+//! slmPy can compress by bzip2 too; such frames are answered `err`. A level of 255 is 1 on a panel of one bit.
 
-use super::{SentLevels, ServedPanel};
+use super::{SentFrame, ServedPanel};
 use flate2::read::{GzDecoder, ZlibDecoder};
 use std::io::Read;
 
@@ -18,7 +18,7 @@ pub(super) fn frame_limit(panel: &ServedPanel) -> usize {
 }
 
 /// Reads a frame as it was sent, its length without.
-pub(super) fn read(sent: &[u8], panel: &ServedPanel) -> Result<SentLevels, String> {
+pub(super) fn read(sent: &[u8], panel: &ServedPanel) -> Result<SentFrame, String> {
     let expected = panel.pixels();
     let mut unfolded = Vec::new();
     let bytes = if sent.len() == expected {
@@ -35,7 +35,8 @@ pub(super) fn read(sent: &[u8], panel: &ServedPanel) -> Result<SentLevels, Strin
         }
         &unfolded
     };
-    panel.take(bytes.iter().copied().map(u16::from).collect())
+    let white = |byte: u8| if panel.bits == 1 && byte == 255 { 1 } else { u16::from(byte) };
+    panel.take(bytes.iter().copied().map(white).collect())
 }
 
 #[cfg(test)]
@@ -52,6 +53,7 @@ mod tests {
             width: 40,
             height: 30,
             bits: 8,
+            modulation: crate::panel::Modulation::Phase,
             pixel_pitch: [8e-6, 8e-6],
             wavelength: 532e-9,
             design_wavelength: 532e-9,
@@ -67,9 +69,18 @@ mod tests {
         let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
         gzip.write_all(&raw).expect("memory");
         for sent in [raw.clone(), zlib.finish().expect("memory"), gzip.finish().expect("memory")] {
-            let levels = read(&sent, &panel()).expect("frame").levels;
+            let Ok(SentFrame::Levels(levels)) = read(&sent, &panel()) else { panic!("not read") };
             assert!(levels.iter().zip(&raw).all(|(level, byte)| *level == u16::from(*byte)));
         }
+    }
+
+    #[test]
+    fn black_and_white_are_the_levels_of_one_bit() {
+        let binary = ServedPanel { bits: 1, ..panel() };
+        let sent: Vec<u8> = (0..1200).map(|i| [0, 1, 255][i % 3]).collect();
+        let wanted = (0..1200).map(|i| [0, 1, 1][i % 3]).collect();
+        assert_eq!(read(&sent, &binary), Ok(SentFrame::Levels(wanted)));
+        assert!(read(&[254; 1200], &binary).is_err());
     }
 
     #[test]

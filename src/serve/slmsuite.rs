@@ -2,14 +2,16 @@
 //! way.
 //!
 //! `RemoteSLM` asks `ping` and `pickle` when it is made, then sends `_set_phase_hw` for each frame: final drive levels,
-//! to which neither correction nor look-up table are to be applied again.
+//! to which neither correction nor look-up table are to be applied again. Where asked for, levels are taken as what slmsuite
+//! makes of a phase φ on an ideal panel of N levels, round(−φ·N/2π) − 1 modulo N, and brought back to that phase.
 
 use super::encoding::{base64, quote_plus, unquote_plus};
-use super::{SentLevels, ServedPanel};
+use super::{SentFrame, ServedPanel};
 use flate2::read::ZlibDecoder;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::{Value, json};
+use std::f64::consts::TAU;
 use std::io::Read;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -19,14 +21,16 @@ const VERSION: &str = "0.5.0";
 const HEAD: usize = 64 * 1024;
 
 /// What a client wants.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq)]
 pub(super) enum Wish {
     /// To know what there is.
     Ping,
     /// To know the panel.
     Describe,
+    /// To know that the last frame is on the panel, without showing another (`execute=False`).
+    Wait,
     /// To show a frame.
-    Show(SentLevels),
+    Show(SentFrame),
 }
 
 /// Only what is needed is kept of a request: a tree of a hostile one could be many times its size.
@@ -43,6 +47,7 @@ struct Request {
 #[derive(Deserialize)]
 struct Named {
     display: Option<Packed>,
+    execute: Option<bool>,
 }
 
 #[derive(Deserialize)]
@@ -62,8 +67,8 @@ pub(super) fn request_limit(panel: &ServedPanel) -> usize {
     HEAD + 2 * panel.pixels() * 101 / 100 * 4
 }
 
-/// Reads a request: the line without its end. The error is an answer to the client.
-pub(super) fn read(line: &[u8], panel: &ServedPanel) -> Result<Wish, String> {
+/// Reads a request: the line without its end. `calibrated`: levels stand for phases. The error is an answer to the client.
+pub(super) fn read(line: &[u8], panel: &ServedPanel, calibrated: bool) -> Result<Wish, String> {
     let plain = unquote_plus(line).ok_or("The request is not percent-encoded.")?;
     let request: Request =
         serde_json::from_slice(&plain).map_err(|error| format!("The request is not understood: {error}."))?;
@@ -78,14 +83,31 @@ pub(super) fn read(line: &[u8], panel: &ServedPanel) -> Result<Wish, String> {
     match command.as_str() {
         "pickle" => Ok(Wish::Describe),
         "_set_phase_hw" => {
-            let packed = request.kwargs.and_then(|named| named.display).ok_or("_set_phase_hw carries no display.")?;
-            unpack(&packed, panel).map(Wish::Show)
+            let named = request.kwargs.ok_or("_set_phase_hw carries no display.")?;
+            if named.execute == Some(false) {
+                return Ok(Wish::Wait);
+            }
+            let packed = named.display.ok_or("_set_phase_hw carries no display.")?;
+            let levels = unpack(&packed, panel)?;
+            Ok(Wish::Show(if calibrated { phases(levels, panel.bits) } else { levels }))
         }
         _ => Err(format!("{name}.{command} not present.")),
     }
 }
 
-fn unpack(packed: &Packed, panel: &ServedPanel) -> Result<SentLevels, String> {
+/// The phases that slmsuite's levels stand for: −2π(g + 1)/N, from 0 on.
+fn phases(frame: SentFrame, bits: u8) -> SentFrame {
+    let count = 1u32 << bits;
+    match frame {
+        SentFrame::Levels(levels) => {
+            let phase = |g: u16| (f64::from(count - 1 - u32::from(g)) * TAU / f64::from(count)) as f32;
+            SentFrame::Values(levels.into_iter().map(phase).collect())
+        }
+        values @ SentFrame::Values(_) => values,
+    }
+}
+
+fn unpack(packed: &Packed, panel: &ServedPanel) -> Result<SentFrame, String> {
     if packed.shape != [u64::from(panel.height), u64::from(panel.width)] {
         let (width, height) = (panel.width, panel.height);
         return Err(format!("The display is of shape {:?}, the panel of [{height}, {width}].", packed.shape));
@@ -127,8 +149,12 @@ pub(super) fn hardware(panel: &ServedPanel) -> Value {
 }
 
 /// The answer to `pickle`: what a client must know of the panel, in slmsuite's names and micrometres.
-pub(super) fn description(panel: &ServedPanel) -> Value {
+///
+/// slmsuite's `phase_scaling` is the part of its levels that one turn takes: the wavelength over the one at which all of
+/// them are a turn. Where levels stand for phases, all of them are one.
+pub(super) fn description(panel: &ServedPanel, calibrated: bool) -> Value {
     let [pitch_x, pitch_y] = panel.pixel_pitch;
+    let design = if calibrated { panel.wavelength } else { panel.design_wavelength };
     let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64());
     json!({
         "__version__": VERSION,
@@ -144,8 +170,8 @@ pub(super) fn description(panel: &ServedPanel) -> Value {
             "pitch": [pitch_x / panel.wavelength, pitch_y / panel.wavelength],
             "settle_time_s": panel.settle_time,
             "wav_um": panel.wavelength * 1e6,
-            "wav_design_um": panel.design_wavelength * 1e6,
-            "phase_scaling": panel.design_wavelength / panel.wavelength,
+            "wav_design_um": design * 1e6,
+            "phase_scaling": panel.wavelength / design,
         },
     })
 }
@@ -164,6 +190,7 @@ mod tests {
             width: 5,
             height: 3,
             bits: 10,
+            modulation: crate::panel::Modulation::Phase,
             pixel_pitch: [8e-6, 8e-6],
             wavelength: 532e-9,
             design_wavelength: 633e-9,
@@ -201,17 +228,42 @@ mod tests {
     #[test]
     fn frames_of_both_widths_are_read() {
         let bytes: Vec<u8> = (0..15).map(|i| i * 17).collect();
-        let Ok(Wish::Show(sent)) = read(request("[3, 5]", "uint8", &packed(&bytes)).as_bytes(), &panel()) else {
+        let Ok(Wish::Show(SentFrame::Levels(sent))) =
+            read(request("[3, 5]", "uint8", &packed(&bytes)).as_bytes(), &panel(), false)
+        else {
             panic!("not read");
         };
-        assert_eq!((sent.width, sent.height), (5, 3));
-        assert!(sent.levels.iter().zip(&bytes).all(|(level, byte)| *level == u16::from(*byte)));
+        assert!(sent.iter().zip(&bytes).all(|(level, byte)| *level == u16::from(*byte)));
         let words: Vec<u16> = (0..15).map(|i| i * 73).collect();
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-        let Ok(Wish::Show(sent)) = read(request("[3, 5]", "uint16", &packed(&bytes)).as_bytes(), &panel()) else {
+        let Ok(Wish::Show(SentFrame::Levels(sent))) =
+            read(request("[3, 5]", "uint16", &packed(&bytes)).as_bytes(), &panel(), false)
+        else {
             panic!("not read");
         };
-        assert_eq!(sent.levels, words);
+        assert_eq!(sent, words);
+    }
+
+    #[test]
+    fn levels_are_brought_back_to_slmsuites_phases() {
+        // What `SLM._phase2gray` does with a phase, where one turn takes all levels.
+        let gray = |phase: f64| ((-phase * 1024.0 / TAU).round_ties_even() as i64 - 1).rem_euclid(1024) as u16;
+        let wished: Vec<f64> = (0..15).map(|i| f64::from(i) * 0.4187).collect();
+        let words: Vec<u8> = wished.iter().flat_map(|phase| gray(*phase).to_le_bytes()).collect();
+        let line = request("[3, 5]", "uint16", &packed(&words));
+        let Ok(Wish::Show(SentFrame::Values(sent))) = read(line.as_bytes(), &panel(), true) else {
+            panic!("not read");
+        };
+        for (sent, wished) in sent.iter().zip(wished) {
+            // Half a level of rounding, and f32.
+            assert!((f64::from(*sent) - wished).abs() < 0.5 * TAU / 1024.0 + 1e-6, "{sent} {wished}");
+        }
+    }
+
+    #[test]
+    fn a_frame_that_is_not_to_be_executed_is_not_shown() {
+        let line = request("[3, 5]", "uint8", &packed(&[7; 15])).replace("block", "execute").replace("true", "false");
+        assert_eq!(read(line.as_bytes(), &panel(), false), Ok(Wish::Wait));
     }
 
     #[test]
@@ -236,7 +288,7 @@ mod tests {
             (quote_plus(br#"{"name": "panel", "command": "__init__"}"#), "not present"),
             (quote_plus(br#"{"name": "panel", "command": "_set_phase_hw", "kwargs": {}}"#), "no display"),
         ] {
-            let why = read(line.as_bytes(), &panel()).expect_err(word);
+            let why = read(line.as_bytes(), &panel(), false).expect_err(word);
             assert!(why.contains(word), "{word}: {why}");
         }
     }
@@ -247,23 +299,27 @@ mod tests {
             let json = format!(
                 r#"{{"name": "panel", "command": "{command}", "args": [], "kwargs": {{"attributes": false}}}}"#
             );
-            read(quote_plus(json.as_bytes()).as_bytes(), &panel())
+            read(quote_plus(json.as_bytes()).as_bytes(), &panel(), false)
         };
         assert_eq!(ask("ping"), Ok(Wish::Ping));
         assert_eq!(ask("pickle"), Ok(Wish::Describe));
         assert_eq!(answer(Ok(hardware(&panel()))), "%5Btrue%2C%7B%22panel%22%3A%22slm%22%7D%5D\n");
-        let meta = &description(&panel())["__meta__"];
+        let meta = &description(&panel(), false)["__meta__"];
         assert_eq!(meta["shape"], json!([3, 5]));
         assert_eq!(meta["bitdepth"], 10);
         assert_eq!(meta["bitresolution"], 1024);
         assert!((meta["wav_um"].as_f64().expect("wavelength") - 0.532).abs() < 1e-12);
         assert!((meta["pitch_um"][0].as_f64().expect("pitch") - 8.0).abs() < 1e-12);
+        // A turn at 532 nm takes fewer levels than at 633 nm.
+        assert!((meta["phase_scaling"].as_f64().expect("scaling") - 532.0 / 633.0).abs() < 1e-12);
+        let meta = &description(&panel(), true)["__meta__"];
+        assert_eq!(meta["phase_scaling"], 1.0);
     }
 
     proptest! {
         #[test]
         fn any_bytes_are_answered_without_panic(line in prop::collection::vec(any::<u8>(), 0..400)) {
-            let _ = read(&line, &panel());
+            let _ = read(&line, &panel(), false);
         }
     }
 }

@@ -13,6 +13,7 @@ pub(crate) const CASES: &[Case] = &[
     ("the_program_lists_the_monitors_and_names_them_when_one_is_not_there", monitors),
     ("the_program_shows_every_level_of_a_frame_on_the_monitor_asked_for", show),
     ("every_display_command_of_the_readme_runs", readme),
+    ("every_line_of_python_in_the_readme_runs_on_a_served_panel", python),
 ];
 
 fn program(desk: &Desk, folder: &Path, arguments: &[&str]) -> Command {
@@ -92,4 +93,81 @@ fn readme(desk: &Desk) -> Ended {
     }
     assert!(run >= 3, "only {run} commands were found");
     Ended::Passed
+}
+
+/// The README's blocks of a kind, in their order.
+fn blocks(kind: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md");
+    let mut blocks = Vec::new();
+    let mut inside = false;
+    for line in text.lines() {
+        if let Some(named) = line.strip_prefix("```") {
+            inside = named == kind;
+            if inside {
+                blocks.push(String::new());
+            }
+        } else if let (true, Some(block)) = (inside, blocks.last_mut()) {
+            *block += line;
+            block.push('\n');
+        }
+    }
+    blocks
+}
+
+fn python(desk: &Desk) -> Ended {
+    let folder = tempfile::tempdir().expect("folder");
+    // The usual port may be another server's on this machine.
+    let free = || {
+        let door = std::net::TcpListener::bind("127.0.0.1:0").expect("port");
+        door.local_addr().expect("port").port().to_string()
+    };
+    let (slmsuite, slmpy) = (free(), free());
+    let here = |text: &str| text.replace("HDMI-1", PANEL).replace("5025", &slmsuite).replace("9999", &slmpy);
+    let mut served = None;
+    let commands = blocks("sh serve").concat();
+    for line in commands.lines() {
+        let line = here(line);
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let mut command = program(desk, folder.path(), &words[1..]);
+        command.env("XDG_RUNTIME_DIR", folder.path());
+        if words.contains(&"--write-python") {
+            assert!(command.output().expect("runs").status.success(), "{line}");
+        } else {
+            let mut process = command.stdout(Stdio::piped()).spawn().expect("runs");
+            let mut said = String::new();
+            let output = process.stdout.as_mut().expect("output");
+            std::io::BufRead::read_line(&mut std::io::BufReader::new(output), &mut said).expect("line");
+            assert!(said.contains("1920x1080"), "{line}: {said}");
+            served = Some(process);
+        }
+    }
+    let mut served = served.expect("the README serves a panel");
+    let python = std::env::var("HOLODRIVE_PYTHON").unwrap_or_else(|_| "python3".into());
+    let mut ended = Ended::Passed;
+    let blocks = blocks("python");
+    assert_eq!(blocks.len(), 2);
+    for block in &blocks {
+        let mut command = Command::new(&python);
+        // The module is the one that the program wrote.
+        command.args(["-c", &here(block)]).current_dir(folder.path()).env("XDG_RUNTIME_DIR", folder.path());
+        let out = command.env("PYTHONDONTWRITEBYTECODE", "1").output();
+        match out {
+            Ok(out) if out.status.success() => {}
+            Ok(out) => {
+                let said = String::from_utf8_lossy(&out.stderr).into_owned();
+                let missing = said.lines().last().is_some_and(|line| line.starts_with("ModuleNotFoundError"));
+                assert!(missing && std::env::var_os("HOLODRIVE_PYTHON").is_none(), "{block}: {said}");
+                ended = Ended::Optional(format!("{python} has no NumPy or slmsuite"));
+            }
+            Err(_) => ended = Ended::Optional(format!("{python} is not there")),
+        }
+    }
+    if matches!(ended, Ended::Passed) {
+        // slmsuite's zero phase is its highest level.
+        let plug = desk.plug(PANEL);
+        assert!(desk.capture_monitor(&plug).pixels.iter().all(|pixel| *pixel == [255; 3]));
+    }
+    let asked = Command::new("kill").args(["-INT", &served.id().to_string()]).status().expect("kill");
+    assert!(asked.success() && served.wait().expect("ends").success());
+    ended
 }

@@ -4,11 +4,9 @@
 use crate::desk::PATIENCE;
 use crate::frames::{Pattern, Picture};
 use holodrive::display::{
-    Display, DisplayFrame, OnAbsence, PanelWindow, PlaySettings, ShowSettings, Standing, WindowSettings, examine, play,
-    serve, show,
+    Display, OnAbsence, PanelWindow, PlaySettings, ShowSettings, Standing, WindowSettings, examine, play, show,
 };
 use holodrive::progress::Progress;
-use holodrive::serve::{SentLevels, ServeSettings, ServedPanel, Server};
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 use std::process::{Child, Command, ExitCode, Stdio};
@@ -24,8 +22,6 @@ const JOB: &str = "HOLODRIVE_DISPLAY_TEST_JOB";
 pub(crate) enum Job {
     /// List the monitors.
     Monitors,
-    /// Keep the panel for other programs; the first line of the answer tells the two ports.
-    Serve(ShowJob),
     /// Look at everything that spoils levels on that monitor.
     Examine(String),
     /// Show one frame.
@@ -85,30 +81,6 @@ fn run(job: Job) -> holodrive::Result<serde_json::Value> {
     let mut display = Display::connect()?;
     match job {
         Job::Monitors => Ok(json(&display.monitors()?)),
-        Job::Serve(job) => {
-            let free = Some("127.0.0.1:0".parse().expect("address"));
-            let panel = ServedPanel {
-                name: "panel".into(),
-                width: job.width,
-                height: job.height,
-                bits: 8,
-                pixel_pitch: [8e-6; 2],
-                wavelength: 532e-9,
-                design_wavelength: 532e-9,
-                settle_time: 0.0,
-            };
-            let settings = ServeSettings { slmsuite: free, slmpy: free, ..ServeSettings::default() };
-            let server = Server::start(panel, &settings)?;
-            let port = |address: Option<std::net::SocketAddr>| address.map_or(0, |address| address.port());
-            println!("{} {}", port(server.slmsuite()), port(server.slmpy()));
-            let mut pack = |sent: &SentLevels| {
-                let levels: Vec<u8> = sent.levels.iter().map(|&level| level as u8).collect();
-                DisplayFrame::from_gray(sent.width, sent.height, &levels)
-            };
-            let window = (&job.monitor.parse()?, &job.window()?);
-            let (idle, stop) = (job.picture().frame(), stopped_by_input());
-            Ok(json(&serve(&mut display, &server, idle, window, &mut pack, &stop)?))
-        }
         Job::Examine(monitor) => Ok(json(&examine(&mut display, Some(&monitor.parse()?))?)),
         Job::Show(job) => {
             let settings = ShowSettings {
@@ -213,17 +185,6 @@ impl Running {
         command.env(JOB, serde_json::to_string(job).expect("job")).envs(environment.iter().copied());
         let process = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("child process");
         Self { process, _runtime: runtime }
-    }
-
-    /// The first line that it prints.
-    pub(crate) fn line(&mut self) -> String {
-        // Byte by byte: what comes after the line is the report's.
-        let output = self.process.stdout.as_mut().expect("output");
-        let (mut line, mut byte) = (Vec::new(), [0]);
-        while output.read_exact(&mut byte).is_ok() && byte != *b"\n" {
-            line.push(byte[0]);
-        }
-        String::from_utf8_lossy(&line).into_owned()
     }
 
     /// Tells it to present the next frame.

@@ -14,8 +14,11 @@ mod monitors;
 mod ownership;
 mod pixels;
 mod server;
+#[cfg(unix)]
 mod serving;
 mod timing;
+#[cfg(unix)]
+mod wayland;
 mod window_manager;
 
 use desk::Desk;
@@ -45,8 +48,11 @@ fn main() -> ExitCode {
         pixels::CASES,
         ownership::CASES,
         timing::CASES,
+        #[cfg(unix)]
         serving::CASES,
         window_manager::CASES,
+        #[cfg(unix)]
+        wayland::CASES,
         binary::CASES,
     ]
     .concat();

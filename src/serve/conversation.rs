@@ -1,0 +1,290 @@
+//! One client's talk with the server: read within limits of size and time, and answered.
+
+use super::connections::{Client, FRAMES, REFUSED, Shared};
+#[cfg(unix)]
+use super::local::{self, Buffer};
+use super::slmsuite::{Wish, answer, description, hardware};
+use super::stream::Stream;
+use super::{Flip, FrameRequest, SentFrame, slmpy, slmsuite};
+use std::io::{self, ErrorKind, Read, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::sync_channel;
+use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Bytes read at once.
+const CHUNK: usize = 64 * 1024;
+/// How many whole requests' worth of bytes may be held at once, over all clients.
+const HELD_REQUESTS: usize = 4;
+/// A request may take this many times the patience in all, however steadily it drips.
+const WHOLE_REQUEST: u32 = 6;
+
+/// One client's talk with the server.
+pub(super) struct Conversation<'a> {
+    shared: &'a Shared,
+    client: &'a Client,
+    stream: Stream,
+    /// Who it is, in words.
+    from: String,
+    /// Whether the connection outlives its frames.
+    lasting: bool,
+    /// Bytes of it that are held, of the server's budget.
+    held: usize,
+}
+
+impl<'a> Conversation<'a> {
+    pub(super) fn new(shared: &'a Shared, client: &'a Client, stream: Stream, from: String) -> Self {
+        Self { shared, client, stream, from, lasting: true, held: 0 }
+    }
+
+    /// One line in, one line out.
+    pub(super) fn slmsuite(&mut self) -> io::Result<()> {
+        self.lasting = false;
+        let panel = &self.shared.panel;
+        let line = match self.line(slmsuite::request_limit(panel), None) {
+            Ok(line) => line,
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Err(error),
+            Err(error) => {
+                self.shared.count(REFUSED);
+                return self.reply(answer(Err(error.to_string())).as_bytes());
+            }
+        };
+        let wish = slmsuite::read(&line, panel, self.shared.calibrated);
+        drop(line);
+        self.release();
+        let met = match wish {
+            Ok(Wish::Ping) => Ok(hardware(panel)),
+            Ok(Wish::Describe) => Ok(description(panel, self.shared.calibrated)),
+            Ok(Wish::Wait) => Ok(serde_json::Value::Null),
+            Ok(Wish::Show(frame)) => self.show(frame).map(|_| serde_json::Value::Null),
+            Err(why) => {
+                self.shared.count(REFUSED);
+                Err(why)
+            }
+        };
+        self.reply(answer(met).as_bytes())
+    }
+
+    /// Frame after frame, until the client goes or sends what has no end that can be found.
+    pub(super) fn slmpy(&mut self) -> io::Result<()> {
+        let limit = slmpy::frame_limit(&self.shared.panel);
+        loop {
+            let mut head = [0; 4];
+            // Between frames a client may be silent for as long as it likes.
+            self.stream.set_read_timeout(None)?;
+            self.stream.read_exact(&mut head[..1])?;
+            self.whole(&mut head[1..], Instant::now())?;
+            let length = i32::from_le_bytes(head);
+            let Some(length) = usize::try_from(length).ok().filter(|length| (1..=limit).contains(length)) else {
+                self.shared.count(REFUSED);
+                return self.reply(slmpy::ERR);
+            };
+            if !self.hold(length, limit) {
+                self.shared.count(REFUSED);
+                return self.reply(slmpy::ERR);
+            }
+            let mut sent = Vec::new();
+            let start = Instant::now();
+            while sent.len() < length {
+                let had = sent.len();
+                // Memory grows with what has come, not with what was promised.
+                sent.resize((had + CHUNK).min(length), 0);
+                if let Err(error) = self.whole(&mut sent[had..], start) {
+                    self.shared.count(REFUSED);
+                    let _ = self.reply(slmpy::ERR);
+                    return Err(error);
+                }
+            }
+            let read = slmpy::read(&sent, &self.shared.panel);
+            drop(sent);
+            self.release();
+            let shown = match read {
+                Ok(frame) => self.show(frame).is_ok(),
+                Err(_) => {
+                    self.shared.count(REFUSED);
+                    false
+                }
+            };
+            self.reply(if shown { slmpy::DONE } else { slmpy::ERR })?;
+        }
+    }
+
+    /// The local protocol: a line for each frame, whose values stand in a file that both have.
+    #[cfg(unix)]
+    pub(super) fn local(&mut self) -> io::Result<()> {
+        let shared = self.shared;
+        let buffer = match Buffer::new(shared.local_folder(), &shared.panel) {
+            Ok(buffer) => buffer,
+            Err(error) => return self.reply(local::refusal(&error.to_string()).as_bytes()),
+        };
+        self.reply(local::greeting(&shared.panel, &buffer).as_bytes())?;
+        loop {
+            let mut first = [0];
+            self.stream.set_read_timeout(None)?;
+            self.stream.read_exact(&mut first)?;
+            let arrived = Instant::now();
+            let line = match self.line(local::LINE_LIMIT, Some(first[0])) {
+                Ok(line) => line,
+                Err(error) => {
+                    self.shared.count(REFUSED);
+                    let _ = self.reply(local::refusal(&error.to_string()).as_bytes());
+                    return Err(error);
+                }
+            };
+            self.release();
+            let wish = local::read(&line).and_then(|wish| match wish {
+                local::Wish::Mapped => {
+                    buffer.unlink();
+                    Ok(None)
+                }
+                local::Wish::Show(values) => {
+                    let frame = self.wait_for_room(buffer.bytes()).and_then(|()| buffer.take(values, &shared.panel));
+                    self.release();
+                    frame.map(Some)
+                }
+            });
+            let outcome = match wish {
+                Ok(None) => Ok(local::done()),
+                Ok(Some(frame)) => self.show(frame).map(|flip| local::answer(&flip, arrived)),
+                Err(why) => {
+                    self.shared.count(REFUSED);
+                    Err(why)
+                }
+            };
+            let answer = outcome.unwrap_or_else(|why| local::refusal(&why));
+            self.reply(answer.as_bytes())?;
+        }
+    }
+
+    /// Hands a frame on and waits until it is on the panel, and has settled where that was asked for.
+    fn show(&self, frame: SentFrame) -> Result<Flip, String> {
+        self.client.answering.store(true, Ordering::SeqCst);
+        let (answer, shown) = sync_channel(1);
+        self.shared.count(FRAMES);
+        let abandoned = Arc::new(AtomicBool::new(false));
+        let request = FrameRequest {
+            frame,
+            arrived: Instant::now(),
+            from: self.from.clone(),
+            client: self.lasting.then_some(self.client.number),
+            answer,
+            abandoned: Arc::clone(&abandoned),
+        };
+        let sent = self.shared.frames.send(request).map_err(|_| "The panel is no longer served.".to_owned());
+        let outcome = sent.and_then(|()| {
+            let answer = shown.recv_timeout(self.shared.patience);
+            answer.unwrap_or_else(|_| {
+                abandoned.store(true, Ordering::SeqCst);
+                Err("The panel did not show the frame in time.".into())
+            })
+        });
+        if let Ok(flip) = &outcome {
+            // Here and not at the panel: others may have theirs shown meanwhile.
+            std::thread::sleep(self.shared.settle.saturating_sub(flip.at.elapsed()));
+        }
+        self.client.answering.store(false, Ordering::SeqCst);
+        outcome
+    }
+
+    fn reply(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.stream.write_all(bytes)?;
+        self.stream.flush()
+    }
+
+    /// Reads up to the first line feed, which is left out. `first`: a byte of it that was read already.
+    ///
+    /// What has come behind the line feed is lost: clients wait for the answer before they send more.
+    fn line(&mut self, limit: usize, first: Option<u8>) -> io::Result<Vec<u8>> {
+        let start = Instant::now();
+        let (mut line, mut chunk) = (Vec::new(), vec![0; CHUNK.min(limit)]);
+        match first {
+            Some(b'\n') => return Ok(line),
+            Some(byte) => line.push(byte),
+            None => {}
+        }
+        loop {
+            let read = self.some(&mut chunk, start)?;
+            let (part, ended) = match chunk[..read].iter().position(|&byte| byte == b'\n') {
+                Some(end) => (&chunk[..end], true),
+                None => (&chunk[..read], false),
+            };
+            if line.len() + part.len() > limit {
+                return Err(io::Error::new(
+                    ErrorKind::InvalidData,
+                    "The request is longer than a frame of this panel.",
+                ));
+            }
+            if !self.hold(part.len(), limit) {
+                return Err(io::Error::new(ErrorKind::OutOfMemory, "The server is busy with other requests."));
+            }
+            line.extend_from_slice(part);
+            if ended {
+                return Ok(line);
+            }
+        }
+    }
+
+    /// Fills `buffer` whole.
+    fn whole(&mut self, buffer: &mut [u8], start: Instant) -> io::Result<()> {
+        let mut filled = 0;
+        while filled < buffer.len() {
+            filled += self.some(&mut buffer[filled..], start)?;
+        }
+        Ok(())
+    }
+
+    /// Reads what has come, at least a byte; fails when the client is silent too long or the request of `start` is too old.
+    fn some(&mut self, buffer: &mut [u8], start: Instant) -> io::Result<usize> {
+        let patience = self.shared.patience;
+        let left = (patience * WHOLE_REQUEST).saturating_sub(start.elapsed());
+        let late = || io::Error::new(ErrorKind::TimedOut, "The request did not come in time.");
+        if left.is_zero() {
+            return Err(late());
+        }
+        // A timeout of zero would be none.
+        self.stream.set_read_timeout(Some(patience.min(left).max(Duration::from_millis(1))))?;
+        match self.stream.read(buffer) {
+            Ok(0) => Err(io::Error::new(ErrorKind::UnexpectedEof, "The client has gone.")),
+            Ok(read) => {
+                *self.client.heard.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
+                Ok(read)
+            }
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => Err(late()),
+            Err(error) if error.kind() == ErrorKind::Interrupted => self.some(buffer, start),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Takes `bytes` of the server's budget, which is of requests up to `limit`; false when it is spent. The first
+    /// request always fits.
+    fn hold(&mut self, bytes: usize, limit: usize) -> bool {
+        let limit = limit.max(slmsuite::request_limit(&self.shared.panel));
+        let before = self.shared.held.fetch_add(bytes, Ordering::SeqCst);
+        self.held += bytes;
+        before + bytes <= HELD_REQUESTS * limit
+    }
+
+    /// Takes `bytes` of the budget as soon as others have given back what they held.
+    #[cfg(unix)]
+    fn wait_for_room(&mut self, bytes: usize) -> Result<(), String> {
+        let start = Instant::now();
+        while !self.hold(bytes, bytes) {
+            self.release();
+            if start.elapsed() > self.shared.patience {
+                return Err(local::BUSY.to_owned());
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Ok(())
+    }
+
+    fn release(&mut self) {
+        self.shared.held.fetch_sub(std::mem::take(&mut self.held), Ordering::SeqCst);
+    }
+}
+
+impl Drop for Conversation<'_> {
+    fn drop(&mut self) {
+        self.release();
+    }
+}

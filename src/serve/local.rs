@@ -1,0 +1,422 @@
+//! The local protocol: programs of the same user on the same machine, without copying frames through a network.
+//!
+//! A client connects to a Unix socket. The server answers with one line of JSON: what the panel is, and the path of a file
+//! as long as the largest frame, made for this connection alone. The client maps that file into its memory and says
+//! `{"mapped": true}`, upon which the file's name is removed; it lives until both sides have closed it. From then on
+//! the client writes an array into the mapping and sends a line such as
+//!
+//! ```text
+//! {"show": "phase", "dtype": "float32"}
+//! ```
+//!
+//! with `phase` [rad] in `float32` or `float64`, `amplitude` (0 … 1) likewise, or `levels` in `uint8` or `uint16`: row-major,
+//! row 0 on top, the machine's byte order. The answer is a line when the frame is on the panel,
+//!
+//! ```text
+//! {"number": 7, "time": 5121.034512, "missed": 0}
+//! ```
+//!
+//! with the time at which it was handed over on the system's monotonic clock [s], or `{"error": "…"}`. Phases and amplitudes go
+//! through the panel's correction and level curve here; levels are final.
+//!
+//! # Why it is made so
+//!
+//! A file-system socket is the user's own by its permissions; a port of loopback is everybody's on the machine. The array
+//! crosses in shared memory, so that neither side copies it through a socket in pieces. The server *reads* the file and
+//! never maps it: a client that cuts the file short would end a process that has it mapped (SIGBUS), but only
+//! shortens a read. The server makes the file, because a path that a client names could be any file that the server may read,
+//! or a pipe that never answers. The values are copied once before they are looked at, so that a client which goes on
+//! writing spoils its own frame only.
+
+use super::clock::{monotonic_seconds, user};
+use super::{Flip, SentFrame, ServedPanel};
+use crate::error::{Error, Result};
+use crate::panel::Modulation;
+use rayon::prelude::*;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::f64::consts::TAU;
+use std::fs::{self, DirBuilder, File, OpenOptions};
+use std::io;
+use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+/// Version of the protocol.
+const VERSION: u32 = 1;
+/// Longest request [bytes]; real ones have about fifty.
+pub(super) const LINE_LIMIT: usize = 1024;
+/// What a client is told when too many frames are being read at once.
+pub(super) const BUSY: &str = "The server is busy with other frames.";
+/// Bytes of a pixel in the widest type that is taken.
+const WIDEST: usize = 8;
+
+/// Numbers buffers, so that two connections do not share one.
+static BUFFERS: AtomicU64 = AtomicU64::new(0);
+
+/// The folder in which servers of this user have their sockets: `$XDG_RUNTIME_DIR/holodrive`, or a folder of the user's
+/// own among the temporary files.
+pub fn runtime_folder() -> PathBuf {
+    match std::env::var_os("XDG_RUNTIME_DIR").filter(|folder| Path::new(folder).is_absolute()) {
+        Some(folder) => Path::new(&folder).join("holodrive"),
+        None => PathBuf::from(format!("/tmp/holodrive-{}", user())),
+    }
+}
+
+/// A socket that is ours, and the folder that it is in.
+pub(super) struct Place {
+    socket: PathBuf,
+    folder: PathBuf,
+}
+
+impl Place {
+    /// Makes the folder, where it is not there, and the socket in it.
+    ///
+    /// # Errors
+    /// [`Error::Display`] when another server has the socket, or the folder belongs to somebody else; [`Error::Io`].
+    pub(super) fn take(socket: &Path) -> Result<(Self, UnixListener)> {
+        let folder = match socket.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder.to_path_buf(),
+            _ => PathBuf::from("."),
+        };
+        if !folder.exists() {
+            DirBuilder::new().mode(0o700).create(&folder).map_err(Error::io(&folder))?;
+        }
+        // In a folder that others may write in, they could put a socket of theirs in the place of ours.
+        let about = fs::symlink_metadata(&folder).map_err(Error::io(&folder))?;
+        let private = folder == runtime_folder();
+        if private && (!about.is_dir() || about.uid() != user() || about.mode() & 0o022 != 0) {
+            let what = format!("{} is not a folder that only you can write in; remove it", folder.display());
+            return Err(Error::Display { what });
+        }
+        if fs::symlink_metadata(socket).is_ok() {
+            if UnixStream::connect(socket).is_ok() {
+                let what = format!(
+                    "{} is another server's; end that one, or give this one another --name or --local",
+                    socket.display()
+                );
+                return Err(Error::Display { what });
+            }
+            // Left behind by a server that was killed. Anything but a socket is somebody's file.
+            use std::os::unix::fs::FileTypeExt;
+            if !fs::symlink_metadata(socket).is_ok_and(|about| about.file_type().is_socket()) {
+                return Err(Error::Display { what: format!("{} is a file, not a socket", socket.display()) });
+            }
+            fs::remove_file(socket).map_err(Error::io(socket))?;
+        }
+        let door = UnixListener::bind(socket).map_err(Error::io(socket))?;
+        fs::set_permissions(socket, fs::Permissions::from_mode(0o600)).map_err(Error::io(socket))?;
+        Ok((Self { socket: socket.to_path_buf(), folder }, door))
+    }
+
+    pub(super) fn socket(&self) -> &Path {
+        &self.socket
+    }
+
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Takes the socket away.
+    pub(super) fn leave(&self) {
+        // One that is gone already is no loss.
+        let _ = fs::remove_file(&self.socket);
+    }
+}
+
+/// The memory that one client shares with the server.
+pub(super) struct Buffer {
+    file: File,
+    path: PathBuf,
+    bytes: usize,
+}
+
+impl Buffer {
+    /// A new one in `folder`, for one frame of `panel`; it takes no memory until it is written.
+    pub(super) fn new(folder: &Path, panel: &ServedPanel) -> io::Result<Self> {
+        let number = BUFFERS.fetch_add(1, Ordering::Relaxed);
+        // Clients in another folder must find it, too.
+        let folder = fs::canonicalize(folder)?;
+        let path = folder.join(format!(".frame-{}-{number}", std::process::id()));
+        let file = OpenOptions::new().read(true).write(true).create_new(true).mode(0o600).open(&path)?;
+        let bytes = WIDEST * panel.pixels();
+        let buffer = Self { file, path, bytes };
+        buffer.file.set_len(bytes as u64)?;
+        Ok(buffer)
+    }
+
+    /// Its length [bytes].
+    pub(super) fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// Removes its name: nothing is left behind, however server and client end.
+    pub(super) fn unlink(&self) {
+        let _ = fs::remove_file(&self.path);
+    }
+
+    /// Copies a frame out of it.
+    pub(super) fn take(&self, values: Values, panel: &ServedPanel) -> Result<SentFrame, String> {
+        let pixels = panel.pixels();
+        let wrong = |wants: &str, has: &str| Err(format!("The panel modulates {has}; it cannot show {wants}."));
+        match (values.kind, panel.modulation) {
+            (Kind::Phase, Modulation::Amplitude) => return wrong("phase", "amplitude"),
+            (Kind::Amplitude, Modulation::Phase) => return wrong("amplitude", "phase"),
+            _ => {}
+        }
+        Ok(match values.dtype {
+            Dtype::Uint8 => panel.take(self.read::<u8>(pixels)?.into_iter().map(u16::from).collect())?,
+            Dtype::Uint16 => panel.take(self.read(pixels)?)?,
+            Dtype::Float32 => SentFrame::Values(self.read(pixels)?),
+            Dtype::Float64 => {
+                // A phase of many turns is brought to one before it loses its last digits.
+                let turn = |v: f64| (v - TAU * (v / TAU).floor()) as f32;
+                let values_read: Vec<f64> = self.read(pixels)?;
+                SentFrame::Values(match values.kind {
+                    Kind::Phase => values_read.into_par_iter().map(turn).collect(),
+                    _ => values_read.into_iter().map(|v| v as f32).collect(),
+                })
+            }
+        })
+    }
+
+    fn read<T: bytemuck::Pod>(&self, count: usize) -> Result<Vec<T>, String> {
+        let mut values = crate::field::zeroed(count);
+        let read = self.file.read_exact_at(bytemuck::cast_slice_mut(&mut values), 0);
+        read.map_err(|error| format!("The shared file cannot be read: {error}."))?;
+        Ok(values)
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        self.unlink();
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Kind {
+    Phase,
+    Amplitude,
+    Levels,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Dtype {
+    Uint8,
+    Uint16,
+    Float32,
+    Float64,
+}
+
+/// What stands in the buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Values {
+    kind: Kind,
+    dtype: Dtype,
+}
+
+/// What a client wants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wish {
+    /// To say that it has mapped the buffer.
+    Mapped,
+    /// To show what is in it.
+    Show(Values),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Request {
+    #[serde(default)]
+    mapped: bool,
+    show: Option<Kind>,
+    dtype: Option<Dtype>,
+}
+
+/// Reads a request: the line without its end. The error is an answer to the client.
+pub(super) fn read(line: &[u8]) -> Result<Wish, String> {
+    let request: Request =
+        serde_json::from_slice(line).map_err(|error| format!("The request is not understood: {error}."))?;
+    match request {
+        Request { mapped: true, show: None, dtype: None } => Ok(Wish::Mapped),
+        Request { mapped: false, show: Some(kind), dtype: Some(dtype) } => {
+            let levels = matches!(dtype, Dtype::Uint8 | Dtype::Uint16);
+            if levels == (kind == Kind::Levels) {
+                Ok(Wish::Show(Values { kind, dtype }))
+            } else {
+                Err("Levels are uint8 or uint16; phases and amplitudes are float32 or float64.".into())
+            }
+        }
+        _ => Err("A request is {\"show\": …, \"dtype\": …} or {\"mapped\": true}.".into()),
+    }
+}
+
+fn line(value: &Value) -> String {
+    let mut text = value.to_string();
+    text.push('\n');
+    text
+}
+
+/// The first line to a client.
+pub(super) fn greeting(panel: &ServedPanel, buffer: &Buffer) -> String {
+    line(&json!({
+        "holodrive": env!("CARGO_PKG_VERSION"),
+        "protocol": VERSION,
+        "name": panel.name,
+        "width": panel.width,
+        "height": panel.height,
+        "bits": panel.bits,
+        "modulation": match panel.modulation {
+            Modulation::Phase => "phase",
+            Modulation::Amplitude => "amplitude",
+        },
+        "pixel_pitch": panel.pixel_pitch,
+        "wavelength": panel.wavelength,
+        "settle_time": panel.settle_time,
+        "buffer": buffer.path.to_string_lossy(),
+        "bytes": buffer.bytes,
+    }))
+}
+
+/// The answer to a request that has nothing to tell.
+pub(super) fn done() -> String {
+    line(&json!({}))
+}
+
+/// The answer to a frame that is on the panel. `arrived`: when its request came in.
+pub(super) fn answer(flip: &Flip, arrived: Instant) -> String {
+    line(&json!({
+        "number": flip.number,
+        "time": monotonic_seconds(flip.at),
+        "missed": flip.missed,
+        "latency": flip.at.saturating_duration_since(arrived).as_secs_f64(),
+    }))
+}
+
+/// The answer to a request that was refused.
+pub(super) fn refusal(why: &str) -> String {
+    line(&json!({ "error": why }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn panel(modulation: Modulation) -> ServedPanel {
+        ServedPanel {
+            name: "panel".into(),
+            width: 5,
+            height: 3,
+            bits: 10,
+            modulation,
+            pixel_pitch: [8e-6, 8e-6],
+            wavelength: 532e-9,
+            design_wavelength: 633e-9,
+            settle_time: 0.05,
+        }
+    }
+
+    fn values(kind: Kind, dtype: Dtype) -> Values {
+        Values { kind, dtype }
+    }
+
+    #[test]
+    fn each_type_is_read_as_it_was_written() {
+        let folder = tempfile::tempdir().expect("folder");
+        let panel = panel(Modulation::Phase);
+        let buffer = Buffer::new(folder.path(), &panel).expect("buffer");
+        let levels: Vec<u16> = (0..15).map(|i| i * 73).collect();
+        buffer.file.write_all_at(bytemuck::cast_slice(&levels), 0).expect("write");
+        assert_eq!(buffer.take(values(Kind::Levels, Dtype::Uint16), &panel), Ok(SentFrame::Levels(levels)));
+        let phases: Vec<f64> = (0..15).map(|i| 0.1 + f64::from(i) + 1e6 * TAU * f64::from(i - 7)).collect();
+        buffer.file.write_all_at(bytemuck::cast_slice(&phases), 0).expect("write");
+        let Ok(SentFrame::Values(read)) = buffer.take(values(Kind::Phase, Dtype::Float64), &panel) else {
+            panic!("not read");
+        };
+        for (i, value) in read.iter().enumerate() {
+            let wanted = (0.1 + i as f64).rem_euclid(TAU);
+            // Seven million turns cost 8 digits of 16.
+            assert!((f64::from(*value) - wanted).abs() < 1e-6, "{i}: {value} {wanted}");
+        }
+        let narrow: Vec<f32> = phases.iter().map(|v| *v as f32).collect();
+        buffer.file.write_all_at(bytemuck::cast_slice(&narrow), 0).expect("write");
+        assert_eq!(buffer.take(values(Kind::Phase, Dtype::Float32), &panel), Ok(SentFrame::Values(narrow)));
+        let bytes: Vec<u8> = (200..215).collect();
+        buffer.file.write_all_at(&bytes, 0).expect("write");
+        let wanted = bytes.into_iter().map(u16::from).collect();
+        assert_eq!(buffer.take(values(Kind::Levels, Dtype::Uint8), &panel), Ok(SentFrame::Levels(wanted)));
+    }
+
+    #[test]
+    fn a_file_cut_short_or_levels_too_high_are_refused() {
+        let folder = tempfile::tempdir().expect("folder");
+        let phase = panel(Modulation::Phase);
+        let buffer = Buffer::new(folder.path(), &phase).expect("buffer");
+        buffer.file.write_all_at(&[0xFF; 30], 0).expect("write");
+        let why = buffer.take(values(Kind::Levels, Dtype::Uint16), &phase).expect_err("levels of 16 bits");
+        assert!(why.contains("1023"), "{why}");
+        let why = buffer.take(values(Kind::Amplitude, Dtype::Float32), &phase).expect_err("a phase panel");
+        assert!(why.contains("modulates phase"), "{why}");
+        let why = buffer.take(values(Kind::Phase, Dtype::Float32), &panel(Modulation::Amplitude));
+        assert!(why.expect_err("an amplitude panel").contains("modulates amplitude"));
+        buffer.file.set_len(59).expect("cut");
+        let why = buffer.take(values(Kind::Phase, Dtype::Float32), &phase).expect_err("15 values of 4 bytes");
+        assert!(why.contains("shared file"), "{why}");
+        drop(buffer);
+        assert_eq!(fs::read_dir(folder.path()).expect("list").count(), 0);
+    }
+
+    #[test]
+    fn requests_are_read_and_others_answered() {
+        let ask = |text: &str| read(text.as_bytes());
+        let wanted = Values { kind: Kind::Phase, dtype: Dtype::Float32 };
+        assert_eq!(ask(r#"{"show": "phase", "dtype": "float32"}"#), Ok(Wish::Show(wanted)));
+        assert_eq!(ask(r#"{"mapped": true}"#), Ok(Wish::Mapped));
+        for wrong in [
+            "",
+            "{}",
+            "[]",
+            "{\"show\": \"phase\"}",
+            r#"{"show": "phase", "dtype": "uint8"}"#,
+            r#"{"show": "levels", "dtype": "float64"}"#,
+            r#"{"show": "levels", "dtype": "int64"}"#,
+            r#"{"show": "levels", "dtype": "uint8", "path": "/etc/passwd"}"#,
+            r#"{"mapped": true, "show": "phase", "dtype": "float32"}"#,
+        ] {
+            assert!(ask(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_socket_is_taken_once_and_a_dead_ones_is_taken_over() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("own").join("panel.sock");
+        let (place, door) = Place::take(&path).expect("socket");
+        let about = fs::metadata(&path).expect("socket");
+        assert_eq!(about.mode() & 0o777, 0o600);
+        assert_eq!(fs::metadata(place.folder()).expect("folder").mode() & 0o777, 0o700);
+        let why = Place::take(&path).err().expect("taken").to_string();
+        assert!(why.contains("another server"), "{why}");
+        // As a killed server leaves it.
+        drop(door);
+        let (place, _door) = Place::take(&path).expect("taken over");
+        place.leave();
+        assert!(!path.exists());
+        fs::write(&path, "a file").expect("write");
+        assert!(Place::take(&path).is_err());
+        assert!(path.exists(), "somebody's file was removed");
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_judged_without_panic(line in prop::collection::vec(any::<u8>(), 0..100)) {
+            let _ = read(&line);
+        }
+    }
+}
