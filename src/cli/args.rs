@@ -11,6 +11,7 @@ pub(crate) use super::scene_args::{
     ColorArgs, DepthArg, FormFactorArg, MirrorDepthArg, PhaseArg, PlacementArg, PlacementArgs, SceneArgs, Wavelengths,
     White,
 };
+pub(crate) use super::sequence_args::{Ahead, RawFormatArg, SequenceArgs};
 
 const EXIT_CODES: &str = "\
 Exit codes: 0 done; 2 wrong flags, bad input, or a file or display that refused (one line says what, where and what to do; \
@@ -58,7 +59,7 @@ pub(crate) enum Command {
     Reconstruct(ReconstructArgs),
     /// The whole way: scene, points, field or frame → pictures on the simulated panel, or light on a real one.
     #[command(
-        after_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show scenes/cornell.gltf --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO"
+        after_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show scenes/cornell.gltf --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive show frames/ --monitor HDMI-1 --fps 30 --loop\n  holodrive show walk.glb --fps 12\n  ffmpeg -i film.mp4 -vf scale=1920:1080 -f rawvideo -pix_fmt gray - | holodrive show - --raw 1920x1080 --monitor HDMI-1 --fps 24"
     )]
     Show(Box<ShowArgs>),
     /// Find a panel's curve and bend: frames to show, and what the measured numbers say.
@@ -368,10 +369,19 @@ pub(crate) enum PresenterArg {
     Software,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum AbsenceArg {
+    End,
+    Wait,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct ShowArgs {
-    /// A scene, a point cloud, a picture with depth (rgb.png+depth.png), a field, or a frame.
+    /// A scene, a point cloud, a picture with depth (rgb.png+depth.png), a field, a frame; or frames in time: a folder of
+    /// pictures, an array (frames × rows × columns, .npy), raw video (- for standard input).
     pub(crate) input: PathBuf,
+    /// Further pictures of frames, played in this order.
+    pub(crate) more: Vec<PathBuf>,
     /// Folder for pictures and data.
     #[arg(short, long, default_value = "holodrive-out", value_name = "DIR")]
     pub(crate) output: PathBuf,
@@ -396,6 +406,11 @@ pub(crate) struct ShowArgs {
     /// What brings the levels to the screen.
     #[arg(long, value_enum, default_value_t = PresenterArg::Auto)]
     pub(crate) present: PresenterArg,
+    /// What is done when the monitor is unplugged or switched off.
+    #[arg(long, value_enum, default_value_t = AbsenceArg::End)]
+    pub(crate) on_absence: AbsenceArg,
+    #[command(flatten)]
+    pub(crate) sequence: SequenceArgs,
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
     #[command(flatten)]

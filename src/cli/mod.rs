@@ -1,5 +1,6 @@
 //! The command line: what was typed becomes settings, what was done becomes lines or JSON.
 
+mod animate;
 mod args;
 mod bar;
 mod bench;
@@ -18,6 +19,8 @@ mod report;
 mod scene_args;
 #[cfg(feature = "display")]
 mod screen;
+mod sequence;
+mod sequence_args;
 mod show;
 mod subframes;
 

@@ -7,6 +7,7 @@ use super::commands::{content, origin, report_field, seen_half, write_traced, wr
 use super::encoding::encode_field;
 use super::load::{self, Input, Panel, Points, channel, hologram_settings, load_points, luminance_picture};
 use super::report::{Report, count, seconds};
+use super::sequence;
 use glam::DVec2;
 use holodrive::field::Field;
 use holodrive::field::npy::{self, Content};
@@ -36,6 +37,9 @@ pub(super) fn show(args: &ShowArgs) -> Result<Report> {
 fn run(args: &ShowArgs) -> Result<Report> {
     let begin = Instant::now();
     let mut report = Report::new("show");
+    if let Some(sequence) = sequence::asked(args)? {
+        return sequence::show(args, sequence, report);
+    }
     let source = load::input(&args.input)?;
     let panel = load::panel_in_color(&args.panel, &args.color, &mut report)?;
     let out = &args.output;
@@ -177,7 +181,7 @@ fn in_color(
     finish(report, &args.output)
 }
 
-fn finish(mut report: Report, out: &Path) -> Result<Report> {
+pub(super) fn finish(mut report: Report, out: &Path) -> Result<Report> {
     report.add("output", out.display().to_string(), format!("pictures and data in {}", out.display()));
     let text = serde_json::to_string_pretty(&report.json()).unwrap_or_default();
     files::write_bytes(&out.join("report.json"), text.as_bytes())?;

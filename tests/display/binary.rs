@@ -15,7 +15,7 @@ pub(crate) const CASES: &[Case] = &[
     ("every_display_command_of_the_readme_runs", readme),
 ];
 
-fn program(desk: &Desk, folder: &Path, arguments: &[&str]) -> Command {
+pub(crate) fn program(desk: &Desk, folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_holodrive"));
     command.args(arguments).current_dir(folder).env("DISPLAY", desk.display()).env_remove("WAYLAND_DISPLAY");
     command
@@ -74,6 +74,12 @@ fn show(desk: &Desk) -> Ended {
 fn readme(desk: &Desk) -> Ended {
     let folder = tempfile::tempdir().expect("folder");
     frame(folder.path());
+    crate::sequences::numbered_frames(&folder.path().join("frames"), 3);
+    std::fs::create_dir(folder.path().join("scenes")).expect("folder");
+    for scene in ["motion.gltf"] {
+        let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene);
+        std::fs::copy(from, folder.path().join("scenes").join(scene)).expect("copy");
+    }
     let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md");
     let mut inside = false;
     let mut run = 0;

@@ -13,6 +13,7 @@ mod frames;
 mod monitors;
 mod ownership;
 mod pixels;
+mod sequences;
 mod server;
 mod serving;
 mod timing;
@@ -45,6 +46,7 @@ fn main() -> ExitCode {
         pixels::CASES,
         ownership::CASES,
         timing::CASES,
+        sequences::CASES,
         serving::CASES,
         window_manager::CASES,
         binary::CASES,
