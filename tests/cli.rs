@@ -235,6 +235,9 @@ fn bad_sequences_end_in_one_line() {
     refused(f, &["show", &motion, "--fps", "12", "--subframes", "2"], "subframes");
     refused(f, &["show", "p.ply", "--fps", "12"], "frames in time");
     refused(f, &["show", &motion, "--ahead", "0"], "ahead");
+    refused(f, &["show", &motion, "--live"], "--monitor");
+    refused(f, &["show", &motion, "--live", "--monitor", "HDMI-1", "--fps", "12"], "--time");
+    refused(f, &["show", "p.ply", "--live", "--monitor", "HDMI-1"], "p.ply");
     write(f, "short.npy", b"\x93NUMPY\x01\x00\x10\x00{'descr': '|u1'}");
     refused(f, &["show", "short.npy"], "short.npy");
 }

@@ -10,6 +10,8 @@ mod commands;
 mod encoding;
 mod layers;
 mod light;
+#[cfg(feature = "display")]
+mod live;
 mod load;
 mod monitors;
 mod parallax;

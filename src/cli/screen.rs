@@ -173,7 +173,7 @@ fn ended(end: ShowEnd) -> Result<()> {
     }
 }
 
-fn hold(args: &ShowArgs) -> Result<Option<Duration>> {
+pub(super) fn hold(args: &ShowArgs) -> Result<Option<Duration>> {
     match args.hold {
         Some(hold) if hold.is_finite() && (0.0..1e9).contains(&hold) => Ok(Some(Duration::from_secs_f64(hold))),
         Some(hold) => Err(Error::parameter("hold", format!("{hold} is not a number of seconds"))),
@@ -181,13 +181,18 @@ fn hold(args: &ShowArgs) -> Result<Option<Duration>> {
     }
 }
 
-fn window(args: &ShowArgs) -> WindowSettings {
+pub(super) fn window(args: &ShowArgs) -> WindowSettings {
     let presenter = match args.present {
         PresenterArg::Auto => Presenter::Auto,
         PresenterArg::Gpu => Presenter::Gpu,
         PresenterArg::Software => Presenter::Software,
     };
     WindowSettings { presenter, exact: !args.allow_altered_levels, ..WindowSettings::default() }
+}
+
+/// Whether the show ends with the monitor.
+pub(super) fn ends_when_absent(args: &ShowArgs) -> bool {
+    on_absence(args) == OnAbsence::End
 }
 
 fn on_absence(args: &ShowArgs) -> OnAbsence {

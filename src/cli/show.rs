@@ -37,6 +37,9 @@ pub(super) fn show(args: &ShowArgs) -> Result<Report> {
 fn run(args: &ShowArgs) -> Result<Report> {
     let begin = Instant::now();
     let mut report = Report::new("show");
+    if args.live {
+        return live(args, report);
+    }
     if let Some(sequence) = sequence::asked(args)? {
         return sequence::show(args, sequence, report);
     }
@@ -117,6 +120,31 @@ fn run(args: &ShowArgs) -> Result<Report> {
     let total = begin.elapsed().as_secs_f64();
     report.add("seconds", total, format!("in all       {:>8}", seconds(total)));
     finish(report, out)
+}
+
+#[cfg(feature = "display")]
+fn live(args: &ShowArgs, report: Report) -> Result<Report> {
+    let in_time = &args.sequence;
+    if in_time.fps.is_some()
+        || in_time.repeat
+        || in_time.from.is_some()
+        || in_time.to.is_some()
+        || !args.more.is_empty()
+    {
+        return Err(Error::parameter("live", "shows a scene at one --time; leave --fps, --loop, --from and --to out"));
+    }
+    if args.color.wavelengths.is_some() || args.subframes != 1 {
+        return Err(Error::parameter("live", "shows one frame of one laser; leave --wavelengths and --subframes out"));
+    }
+    match load::input(&args.input)? {
+        Input::Scene(path) => super::live::show(args, &path, report),
+        _ => Err(Error::input(&args.input, "is no scene (.gltf, .glb); --live follows a scene")),
+    }
+}
+
+#[cfg(not(feature = "display"))]
+fn live(_: &ShowArgs, _: Report) -> Result<Report> {
+    Err(Error::unsupported("this build has no display; build it with the feature `display` (the default)"))
 }
 
 /// The whole way in several frames that are seen as one.

@@ -75,7 +75,7 @@ impl Rectangle {
         Self { x: crtc.x.into(), y: crtc.y.into(), width: crtc.width.into(), height: crtc.height.into() }
     }
 
-    fn meets(&self, other: &Self) -> bool {
+    pub(super) fn meets(&self, other: &Self) -> bool {
         let apart = |a: i32, a_size: u32, b: i32, b_size: u32| {
             i64::from(a) + i64::from(a_size) <= i64::from(b) || i64::from(b) + i64::from(b_size) <= i64::from(a)
         };

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use npyz::{NpyHeader, Order};
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 
 /// Frames of drive levels in a `.npy`: frames × rows × columns (or rows × columns for one), or with three channels last.
@@ -63,8 +63,12 @@ impl LevelStack {
         if promised == 0 {
             return Err(refused());
         }
-        if promised > length {
-            let what = format!("truncated: promises {promised} bytes of frames, the file has {length}");
+        let begin = reader.stream_position().map_err(Error::io(path))?;
+        if promised > length.saturating_sub(begin) {
+            let what = format!(
+                "truncated: promises {promised} bytes of frames, the file has {}",
+                length.saturating_sub(begin)
+            );
             return Err(Error::input(path, what));
         }
         let [frames, height, width, channels] = [frames, height, width, channels].map(|side| side as usize);

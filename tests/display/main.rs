@@ -10,6 +10,7 @@ mod binary;
 mod child;
 mod desk;
 mod frames;
+mod live;
 mod monitors;
 mod ownership;
 mod pixels;
@@ -47,6 +48,7 @@ fn main() -> ExitCode {
         ownership::CASES,
         timing::CASES,
         sequences::CASES,
+        live::CASES,
         serving::CASES,
         window_manager::CASES,
         binary::CASES,
