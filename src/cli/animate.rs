@@ -195,9 +195,9 @@ fn play(
     progress: &std::sync::Arc<Progress>,
     report: &mut Report,
 ) -> Result<()> {
-    use super::args::Ahead;
     use super::screen::packed;
     use super::sequence::state_memory;
+    use super::sequence_args::Ahead;
     use holodrive::Error;
     use holodrive::display::DisplayFrame;
     use std::sync::mpsc::sync_channel;

@@ -11,7 +11,7 @@ pub(crate) use super::scene_args::{
     ColorArgs, DepthArg, FormFactorArg, MirrorDepthArg, PhaseArg, PlacementArg, PlacementArgs, SceneArgs, Wavelengths,
     White,
 };
-pub(crate) use super::sequence_args::{Ahead, RawFormatArg, SequenceArgs};
+pub(crate) use super::sequence_args::{RawFormatArg, SequenceArgs};
 
 const EXIT_CODES: &str = "\
 Exit codes: 0 done; 2 wrong flags, bad input, or a file or display that refused (one line says what, where and what to do; \

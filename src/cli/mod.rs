@@ -7,6 +7,8 @@ mod bench;
 mod calibrate;
 mod colour;
 mod commands;
+#[cfg(feature = "display")]
+mod controls;
 mod encoding;
 mod layers;
 mod light;

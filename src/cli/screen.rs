@@ -1,7 +1,8 @@
 //! A frame on a real monitor.
 
-use super::args::{AbsenceArg, Ahead, PresenterArg, ShowArgs};
+use super::args::{AbsenceArg, PresenterArg, ShowArgs};
 use super::report::{Report, count, seconds};
+use super::sequence_args::Ahead;
 use holodrive::display::{
     self, Display, DisplayFrame, FrameTime, MonitorChoice, OnAbsence, PlaySettings, Presenter, ShowEnd, ShowSettings,
     WindowSettings,

@@ -1,10 +1,12 @@
 //! `show` of frames in time: which input is one, and prepared frames on a monitor or on the simulated panel.
 
-use super::args::{Ahead, RawFormatArg, ShowArgs};
+use super::args::{RawFormatArg, ShowArgs};
 use super::bar::Bar;
 use super::commands::{depth, seen_half};
 use super::load;
 use super::report::{Report, count, seconds};
+#[cfg(feature = "display")]
+use super::sequence_args::Ahead;
 use super::show::finish;
 #[cfg(feature = "display")]
 use holodrive::display::DisplayFrame;

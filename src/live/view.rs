@@ -27,7 +27,7 @@ impl Histogram {
     pub fn of(frame: &Frame) -> Self {
         let mut counts = [0; 256];
         for &level in &frame.levels {
-            counts[usize::from(level) * 256 >> frame.bits.max(1) & 255] += 1;
+            counts[((usize::from(level) * 256) >> frame.bits.max(1)) & 255] += 1;
         }
         Self(counts)
     }

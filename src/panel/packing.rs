@@ -200,10 +200,13 @@ impl SignalLayout {
         let cells = self.packing.cells();
         for slot in 0..slots {
             let frame = frames[slot % frames.len()];
-            for (i, &level) in frame.levels.iter().enumerate() {
-                for cell in 0..cells * cells {
-                    let at = self.at(size, (i % size.0, i / size.0), (cell % cells, cell / cells));
-                    self.packing.put(&mut rgb[at..at + 3], level, slot, cell);
+            for (row, line) in frame.levels.chunks_exact(size.0).enumerate() {
+                for (cell_y, cell_x) in (0..cells).flat_map(|y| (0..cells).map(move |x| (y, x))) {
+                    let cell = cell_y * cells + cell_x;
+                    for (column, &level) in line.iter().enumerate() {
+                        let at = self.at(size, (column, row), (cell_x, cell_y));
+                        self.packing.put(&mut rgb[at..at + 3], level, slot, cell);
+                    }
                 }
             }
         }

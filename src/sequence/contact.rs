@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn a_long_sequence_is_thinned_evenly() {
         let mut sheet = ContactSheet::new(8);
-        for number in (0..100).filter(|n| n % 1 == 0) {
+        for number in 0..100 {
             if sheet.wants(number) {
                 sheet.add(number, format!("#{number}"), vec![picture(1.0)]).expect("cell");
             }

@@ -6,6 +6,7 @@ use crate::server::{ODD_PANEL, OPERATOR, PANEL};
 use crate::{Case, Ended};
 use holodrive::panel::{Frame, PanelProfile};
 use holodrive::random::Random;
+use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -76,10 +77,9 @@ fn readme(desk: &Desk) -> Ended {
     frame(folder.path());
     crate::sequences::numbered_frames(&folder.path().join("frames"), 3);
     std::fs::create_dir(folder.path().join("scenes")).expect("folder");
-    for scene in ["motion.gltf"] {
-        let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene);
-        std::fs::copy(from, folder.path().join("scenes").join(scene)).expect("copy");
-    }
+    let scene = Path::new("scenes/motion.gltf");
+    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join(scene);
+    std::fs::copy(from, folder.path().join(scene)).expect("copy");
     let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md");
     let mut inside = false;
     let mut run = 0;
@@ -89,9 +89,20 @@ fn readme(desk: &Desk) -> Ended {
         } else if inside && !line.trim().is_empty() {
             // The README's monitor is called as most are; here it is the dummy driver's.
             let line = line.replace("HDMI-1", PANEL);
+            // What would come through a pipe comes from here: two frames of raw video.
+            let (piped, line) = match line.split_once(" | ") {
+                Some((_, line)) => (true, line.to_owned()),
+                None => (false, line),
+            };
             let words: Vec<&str> = line.split(" #").next().unwrap_or("").split_whitespace().collect();
             assert_eq!(words[0], "holodrive", "{line}");
-            let out = program(desk, folder.path(), &words[1..]).output().expect("runs");
+            let mut command = program(desk, folder.path(), &words[1..]);
+            command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+            let mut running = command.spawn().expect("runs");
+            if let (true, Some(input)) = (piped, &mut running.stdin) {
+                input.write_all(&vec![100; 2 * 1920 * 1080]).expect("the program reads");
+            }
+            let out = running.wait_with_output().expect("ends");
             assert!(out.status.success(), "{line}: {}", String::from_utf8_lossy(&out.stderr));
             run += 1;
         }

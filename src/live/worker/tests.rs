@@ -61,7 +61,7 @@ fn levels_come_in_their_order_and_a_broken_file_leaves_the_last_good_scene() {
     let path = folder.path().join("scene.gltf");
     std::fs::write(&path, own("motion.gltf")).expect("write");
     let (worker, files) = start(&path, 96);
-    assert_eq!(files, [path.clone()]);
+    assert_eq!(files, std::slice::from_ref(&path));
     let [coarse, fine] = [Detail::Coarse, Detail::Full].map(|detail| refined(&worker, 1, detail));
     assert!(2 * coarse.lit.placed.cloud.points.len() < fine.lit.placed.cloud.points.len());
     assert!(coarse.seconds < fine.seconds);
