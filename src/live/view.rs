@@ -67,25 +67,25 @@ pub fn draw(board: &Board) -> Canvas {
     if let Some(frame) = board.frame {
         let title = format!("frame, {} × {}, {} levels", frame.width, frame.height, 1u32 << frame.bits);
         canvas.write((left, top), 1, FAINT, &title);
-        top += LETTER_HEIGHT + 11;
+        top += LETTER_HEIGHT + 9;
         let height = (width * frame.height / frame.width.max(1)).clamp(1, 200);
         let across = (height * frame.width / frame.height.max(1)).clamp(1, width);
         canvas.put_gray((left, top), across, &small(frame, across, height));
         top += height + 10;
         canvas.write((left, top), 1, FAINT, "how often each level occurs");
-        top += LETTER_HEIGHT + 2;
+        top += LETTER_HEIGHT;
         histogram(&mut canvas, (left, top), &Histogram::of(frame));
         top += HISTOGRAM + 12;
     }
     for (name, value) in &board.lines {
         canvas.write((left, top), 1, FAINT, name);
         canvas.write((left + 84, top), 1, INK, value);
-        top += LETTER_HEIGHT + 2;
+        top += LETTER_HEIGHT;
     }
     top += 4;
     for line in board.keys {
         canvas.write((left, top), 1, FAINT, line);
-        top += LETTER_HEIGHT + 1;
+        top += LETTER_HEIGHT;
     }
     if let Some(warning) = board.warning {
         canvas.fill([0, SIZE.1 - 18, SIZE.0, 18], [120, 40, 20]);

@@ -1,6 +1,6 @@
 //! The thread that computes what was last wished for.
 
-use crate::encode::EncodeSettings;
+use crate::encode::{EncodeSettings, Encoding};
 use crate::error::{Error, Result};
 use crate::hologram::{HologramReport, HologramSettings};
 use crate::illumination::{Illumination, IlluminationSettings};
@@ -20,6 +20,8 @@ use std::time::Instant;
 
 /// Rays across or down of the coarse level, on the longer side.
 const COARSE_RAYS: f64 = 56.0;
+/// What double phase clips at the levels before the last.
+const USUAL_PERCENTILE: f64 = 0.9;
 /// Rays of the middle level, as a share of those that were asked for.
 const MIDDLE_SHARE: f64 = 0.5;
 
@@ -293,7 +295,12 @@ impl Job {
         let cloud = &lit.placed.cloud;
         let computed = pipeline::field(cloud, self.channel, &grid, wish.wavelength, &hologram, progress)?;
         let begin = Instant::now();
-        let mut encoded = pipeline::frame(&computed.field, &self.profile, &wish.encode, progress)?;
+        let mut encode = wish.encode.clone();
+        if let (Encoding::DoublePhase(settings), true) = (&mut encode.encoding, detail != Detail::Full) {
+            // The best percentile of a field of random phases is near it, and is not looked for.
+            settings.percentile = settings.percentile.or(Some(USUAL_PERCENTILE));
+        }
+        let mut encoded = pipeline::frame(&computed.field, &self.profile, &encode, progress)?;
         progress.check()?;
         let origin = &mut encoded.frame.metadata.origin;
         origin.source = Some(self.path.display().to_string());

@@ -68,7 +68,7 @@ impl ContactSheet {
     pub fn draw(&self) -> Canvas {
         let Some(first) = self.cells.first() else { return Canvas::new(1, 1, GROUND) };
         let width = first.pictures.iter().map(|p| p.width).max().unwrap_or(1);
-        let label_height = LETTER_HEIGHT + 2;
+        let label_height = LETTER_HEIGHT;
         let height = label_height + first.pictures.iter().map(|p| p.height + 2).sum::<usize>();
         let columns = COLUMNS.min(self.cells.len());
         let rows = self.cells.len().div_ceil(columns);
@@ -137,9 +137,9 @@ mod tests {
             sheet.add(number, format!("#{number}"), vec![picture(value), picture(1.0)]).expect("cell");
         }
         let canvas = sheet.draw();
-        let (cell, below) = (40 + GAP, LETTER_HEIGHT + 2 + 22 + 22 + GAP);
+        let (cell, below) = (40 + GAP, LETTER_HEIGHT + 22 + 22 + GAP);
         let at = |x: usize, y: usize| canvas.pixels[y * canvas.width + x][0];
-        let top = GAP + LETTER_HEIGHT + 2;
+        let top = GAP + LETTER_HEIGHT;
         assert_eq!((canvas.width, canvas.height), (GAP + 6 * cell, GAP + 2 * below));
         assert_eq!(at(GAP + 5 * cell + 1, top + 1), 255);
         // A quarter of the light, sRGB-coded; its second picture has its own white.

@@ -1,5 +1,4 @@
 use super::*;
-use crate::encode::Encoding;
 use crate::panel::{Packing, SignalLayout};
 use std::time::Duration;
 
