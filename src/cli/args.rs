@@ -388,7 +388,8 @@ pub(crate) struct ShowArgs {
     /// Show the frame fullscreen on this monitor (see `holodrive monitors`) instead of the simulated panel.
     #[arg(long, value_name = "NAME")]
     pub(crate) monitor: Option<String>,
-    /// How long to show it, in seconds [default: until Esc].
+    /// How long to show it (of frames in time: the last one), in seconds [default: until Esc; frames in time end with their
+    /// last].
     #[arg(long, value_name = "SECONDS")]
     pub(crate) hold: Option<f64>,
     /// Block the zero order within this angle of the axis, where the encoding's Fourier stop stands; 0deg lets it pass.

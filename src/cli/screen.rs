@@ -10,9 +10,13 @@ use holodrive::display::{
 use holodrive::panel::Frame;
 use holodrive::progress::Progress;
 use holodrive::{Error, Result};
+use std::collections::VecDeque;
 use std::io::Write;
 use std::sync::Arc;
 use std::time::Duration;
+
+/// Frames whose times a report holds: the last ones.
+const MOST_TIMES: usize = 100_000;
 
 /// The monitor that the user named, found.
 pub(super) struct Screen {
@@ -93,9 +97,13 @@ impl Screen {
             .as_ref()
             .map(|path| Ok((path, std::fs::File::create(path).map_err(Error::io(path))?)))
             .transpose()?;
-        let (mut times, mut unwritten) = (Vec::new(), None);
+        let (mut times, mut unwritten) = (VecDeque::new(), None);
         let mut told = |time: &FrameTime| {
-            times.push(*time);
+            // A loop may run for days.
+            if times.len() == MOST_TIMES {
+                times.pop_front();
+            }
+            times.push_back(*time);
             if let Some((path, file)) = &mut events {
                 let line = serde_json::to_string(time).unwrap_or_default() + "\n";
                 if let Err(source) = file.write_all(line.as_bytes()) {

@@ -20,6 +20,7 @@ use holodrive::sequence::prepared::pictures_in;
 use holodrive::sequence::{ContactSheet, Prepared, RawFormat, Shown, Source};
 use holodrive::{Error, Result, files};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Most frames on a contact sheet.
@@ -116,11 +117,13 @@ struct Opener {
     profile: PanelProfile,
     named: bool,
     wavelength: Option<f64>,
+    /// Ends the wait for raw video.
+    stop: Arc<Progress>,
 }
 
 impl Opener {
     fn open(&self) -> Result<Prepared> {
-        Prepared::open(self.source.clone(), &self.profile, self.named, self.wavelength)
+        Prepared::open(self.source.clone(), (&self.profile, self.named), self.wavelength, &self.stop)
     }
 }
 
@@ -133,27 +136,30 @@ fn prepared(args: &ShowArgs, source: &Source, mut report: Report) -> Result<Repo
     }
     let named = args.panel.panel != "generic";
     let panel = load::panel(&args.panel, &mut report)?;
-    let opener =
-        Opener { source: source.clone(), profile: panel.profile.clone(), named, wavelength: args.panel.wavelength };
+    let bar = Bar::new();
+    // On a monitor the play stops the reading at its end; otherwise only Ctrl-C does.
+    let stop = if args.monitor.is_some() { Arc::default() } else { Arc::clone(&bar.progress) };
+    let profile = panel.profile.clone();
+    let opener = Opener { source: source.clone(), profile, named, wavelength: args.panel.wavelength, stop };
     let frames = opener.open()?;
     let notes = frames.notes();
     #[cfg(feature = "display")]
     if let Some(name) = &args.monitor {
         let screen = super::screen::Screen::find(name)?;
         files::output_folder(&args.output)?;
-        let bar = Bar::new();
         let again = args.sequence.repeat.then(|| opener.clone());
         let played = Repeated { frames, again, shown: false };
         let settle = panel.profile.settle_time.unwrap_or(0.0);
+        let making = Some(Arc::clone(&opener.stop));
         let outcome = if args.sequence.ahead == Ahead::All {
             // What was opened to be played as it comes is read here.
             all_ahead(played.frames, &opener, &bar.progress).and_then(|all| {
                 let rounds = if args.sequence.repeat { usize::MAX } else { 1 };
                 let frames = (0..rounds).flat_map(|_| all.iter().cloned().map(Ok));
-                screen.sequence(frames, args, (args.sequence.fps, settle, None), &bar.progress, &mut report)
+                screen.sequence(frames, args, (args.sequence.fps, settle, making), &bar.progress, &mut report)
             })
         } else {
-            screen.sequence(played, args, (args.sequence.fps, settle, None), &bar.progress, &mut report)
+            screen.sequence(played, args, (args.sequence.fps, settle, making), &bar.progress, &mut report)
         };
         drop(bar);
         report.warn(notes.lock().map(|notes| notes.clone()).unwrap_or_default());
@@ -162,7 +168,6 @@ fn prepared(args: &ShowArgs, source: &Source, mut report: Report) -> Result<Repo
     }
     let begin = Instant::now();
     files::output_folder(&args.output)?;
-    let bar = Bar::new();
     let mut sheet = ContactSheet::new(SHEET);
     bar.progress.start("frames", 0);
     let mut number = 0;
@@ -275,7 +280,7 @@ pub(super) fn state_memory(frames: usize, (width, height): (usize, usize)) -> Re
 
 /// All frames of the sequence in memory.
 #[cfg(feature = "display")]
-fn all_ahead(frames: Prepared, opener: &Opener, progress: &Progress) -> Result<Vec<std::sync::Arc<DisplayFrame>>> {
+fn all_ahead(frames: Prepared, opener: &Opener, progress: &Progress) -> Result<Vec<Arc<DisplayFrame>>> {
     progress.start("frames", 0);
     let mut all = Vec::new();
     let expected = match &opener.source {
@@ -290,7 +295,7 @@ fn all_ahead(frames: Prepared, opener: &Opener, progress: &Progress) -> Result<V
     }
     for shown in frames {
         progress.check()?;
-        all.push(std::sync::Arc::new(for_display(shown?)?));
+        all.push(Arc::new(for_display(shown?)?));
         if 3 * (all.len() * size.0 * size.1) as u64 > AHEAD_MEMORY {
             state_memory(all.len(), size)?;
         }

@@ -19,6 +19,9 @@ const TURN: Duration = Duration::from_millis(5);
 /// Assumed of a monitor that does not tell its refresh rate [Hz].
 const USUAL_REFRESH: f64 = 60.0;
 
+/// Frames of which the time that their presentation took is kept: the last ones of a long play.
+const MOST_TIMES: usize = 65_536;
+
 /// Rates that make sense [Hz]; their periods are durations that can be waited for.
 const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
 
@@ -85,7 +88,8 @@ pub struct PlayReport {
     pub refused: u64,
     /// Frames that were replaced before the modulator had settled on them.
     pub unsettled: u64,
-    /// From a frame's being handed over until the window system had taken it: the median, and the longest [s].
+    /// From a frame's being handed over until the window system had taken it, of the last 65,536: the median, and the
+    /// longest [s].
     pub presenting: [f64; 2],
     /// Mean time between frames [s].
     pub mean_interval: f64,
@@ -184,7 +188,8 @@ struct Player {
     /// Frames that are on the panel, or were, and have not been told of.
     untold: VecDeque<FrameTime>,
     settle: f64,
-    presenting: Vec<f64>,
+    /// Of the last frames [s].
+    presenting: VecDeque<f64>,
 }
 
 #[derive(Default)]
@@ -231,7 +236,7 @@ impl Player {
             counts: Counts::default(),
             untold: VecDeque::new(),
             settle: settings.settle,
-            presenting: Vec::new(),
+            presenting: VecDeque::new(),
             panel,
         })
     }
@@ -275,7 +280,10 @@ impl Player {
             self.tell(handed_over, true, told);
             let shown = self.panel.present(&ready.frame)?;
             let presented = self.since_origin(shown.at);
-            self.presenting.push(presented - handed_over);
+            if self.presenting.len() == MOST_TIMES {
+                self.presenting.pop_front();
+            }
+            self.presenting.push_back(presented - handed_over);
             let missed = ((handed_over - due) / self.refresh).round().max(0.0) as u64;
             self.untold.push_back(FrameTime {
                 number: shown.number,
@@ -415,8 +423,10 @@ impl Player {
 
     fn report(mut self, display: &mut Display, end: ShowEnd) -> Result<PlayReport> {
         let frames = self.panel.frames();
-        self.presenting.sort_by(f64::total_cmp);
-        let (middle, longest) = (self.presenting.len() / 2, self.presenting.last().copied().unwrap_or(0.0));
+        let presenting = self.presenting.make_contiguous();
+        presenting.sort_by(f64::total_cmp);
+        let median = presenting.get(presenting.len() / 2).copied().unwrap_or(0.0);
+        let longest = presenting.last().copied().unwrap_or(0.0);
         let report = PlayReport {
             monitor: self.panel.monitor().clone(),
             presenter: self.presenter,
@@ -426,7 +436,7 @@ impl Player {
             starved: self.counts.starved,
             refused: self.counts.refused,
             unsettled: self.counts.unsettled,
-            presenting: [self.presenting.get(middle).copied().unwrap_or(0.0), longest],
+            presenting: [median, longest],
             mean_interval: if frames > 1 { self.last / (frames - 1) as f64 } else { 0.0 },
             longest_interval: self.longest,
             first_presented: self.first_presented,

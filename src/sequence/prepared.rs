@@ -7,8 +7,10 @@
 use crate::error::{Error, Result};
 use crate::field::npy_stack::LevelStack;
 use crate::panel::{Frame, FrameMetadata, PanelProfile, VideoFrame};
+use crate::progress::Progress;
+use piped::Piped;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
@@ -119,7 +121,7 @@ pub struct Prepared {
 enum Reader {
     Pictures(std::vec::IntoIter<PathBuf>),
     Array(PathBuf, LevelStack),
-    Raw { name: PathBuf, input: Box<dyn Read + Send>, size: (usize, usize), format: RawFormat, number: usize },
+    Raw { name: PathBuf, input: Piped, size: (usize, usize), format: RawFormat, number: usize },
 }
 
 /// A frame as it was read, before those that go together are put together.
@@ -130,11 +132,17 @@ enum One {
 
 impl Prepared {
     /// Opens a sequence for a panel; `named` says that the user chose the panel, which then overrules what pictures say of
-    /// themselves. What is found while it is read stands in [`Prepared::notes`].
+    /// themselves. What is found while it is read stands in [`Prepared::notes`]. `stop` also ends the wait for raw video that
+    /// does not come.
     ///
     /// # Errors
     /// [`Error::Io`] and [`Error::Input`] for what cannot be read or does not fit the panel.
-    pub fn open(source: Source, profile: &PanelProfile, named: bool, wavelength: Option<f64>) -> Result<Self> {
+    pub fn open(
+        source: Source,
+        (profile, named): (&PanelProfile, bool),
+        wavelength: Option<f64>,
+        stop: &Arc<Progress>,
+    ) -> Result<Self> {
         let signal = (profile.signal.width, profile.signal.height);
         let panel = (profile.width, profile.height);
         let fits = |path: &Path, size: (usize, usize), video: bool| {
@@ -159,11 +167,10 @@ impl Prepared {
                 let name = path.clone().unwrap_or_else(|| "standard input".into());
                 fits(&name, (width, height), format == RawFormat::Rgb)?;
                 let input: Box<dyn Read + Send> = match path {
-                    Some(path) => {
-                        Box::new(BufReader::with_capacity(1 << 20, File::open(&path).map_err(Error::io(&path))?))
-                    }
+                    Some(path) => Box::new(File::open(&path).map_err(Error::io(&path))?),
                     None => Box::new(std::io::stdin()),
                 };
+                let input = Piped::new(input, Arc::clone(stop));
                 Reader::Raw { name, input, size: (width, height), format, number: 0 }
             }
         };
@@ -221,7 +228,10 @@ impl Prepared {
             }
             Reader::Raw { name, input, size, format, number } => {
                 let mut bytes = vec![0; format.bytes(size.0, size.1)];
-                let read = fill(input.as_mut(), &mut bytes).map_err(Error::io(&name))?;
+                let read = match fill(input, &mut bytes) {
+                    Err(_) if input.stopped() => return Err(Error::Interrupted),
+                    read => read.map_err(Error::io(&name))?,
+                };
                 if read < bytes.len() {
                     if read > 0 || *number == 0 {
                         let note = format!(
@@ -366,5 +376,6 @@ fn natural(name: &str) -> (Vec<(char, usize, String)>, String) {
     (parts, name.to_owned())
 }
 
+mod piped;
 #[cfg(test)]
 mod tests;

@@ -24,7 +24,7 @@ fn raw(
     let path = folder.path().join("frames.raw");
     std::fs::write(&path, bytes).expect("write");
     let source = Source::Raw { path: Some(path), width: size.0, height: size.1, format };
-    (Prepared::open(source, profile, true, None), folder)
+    (Prepared::open(source, (profile, true), None, &Arc::default()), folder)
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn pictures_come_in_natural_order_and_packed_ones_as_they_are() {
     let pictures = pictures_in(folder.path()).expect("pictures");
     // The panel is what the pictures say, though the default is another.
     let default = PanelProfile::generic().expect("generic");
-    let sequence = Prepared::open(Source::Pictures(pictures), &default, false, None).expect("opens");
+    let sequence = Prepared::open(Source::Pictures(pictures), (&default, false), None, &Arc::default()).expect("opens");
     let seen: Vec<u16> =
         sequence.map(|shown| shown.expect("readable").levels().expect("levels")[0].levels[7]).collect();
     assert_eq!(seen, [1, 2, 10, 33]);
@@ -114,10 +114,35 @@ fn pictures_come_in_natural_order_and_packed_ones_as_they_are() {
     video.write(&path).expect("write");
     for named in [true, false] {
         let given = if named { &planes } else { &default };
-        let mut sequence = Prepared::open(Source::Pictures(vec![path.clone()]), given, named, None).expect("opens");
+        let source = Source::Pictures(vec![path.clone()]);
+        let mut sequence = Prepared::open(source, (given, named), None, &Arc::default()).expect("opens");
         let shown = sequence.next().expect("frame").expect("readable");
         assert_eq!(shown.clone().signal().expect("signal").rgb, video.rgb);
         let unpacked = shown.levels().expect("levels");
         assert!(unpacked.iter().zip(&frames).all(|(a, b)| a.levels == b.levels) && unpacked.len() == 24);
     }
+}
+
+#[test]
+fn the_wait_for_a_pipe_that_gives_nothing_can_be_stopped() {
+    let profile = panel(Packing::Gray, 8);
+    // One whole frame, and then silence for as long as the other end is held.
+    let (reader, mut writer) = std::io::pipe().expect("pipe");
+    std::io::Write::write_all(&mut writer, &[7; 20]).expect("write");
+    let stop = Arc::new(Progress::new());
+    let input = Piped::new(Box::new(reader), Arc::clone(&stop));
+    let raw = Reader::Raw { name: "pipe".into(), input, size: (5, 3), format: RawFormat::Gray, number: 0 };
+    let mut sequence =
+        Prepared { reader: raw, profile, named: true, wavelength: None, notes: Arc::default(), over: false };
+    assert_eq!(levels(sequence.next()), [vec![7; 15]]);
+    let begin = std::time::Instant::now();
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            std::thread::sleep(std::time::Duration::from_millis(30));
+            stop.stop();
+        });
+        assert!(matches!(sequence.next(), Some(Err(Error::Interrupted))));
+    });
+    assert!(begin.elapsed().as_secs_f64() < 5.0 && sequence.next().is_none());
+    drop(writer);
 }
