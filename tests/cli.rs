@@ -400,7 +400,7 @@ fn every_command_of_the_readme_runs() {
     for name in ["frame-red.png", "frame-green.png", "frame-blue.png", "field-red.npy", "reconstruction-sharp.png"] {
         assert!(f.join("colour").join(name).is_file(), "{name} is missing: {:?}", names(&f.join("colour")));
     }
-    for name in ["motion/contact.png", "motion/frames/frame-00007.png", "again/contact.png"] {
+    for name in ["motion/contact.png", "motion/frames/frame-00003.png", "again/contact.png"] {
         assert!(f.join(name).is_file(), "{name} is missing");
     }
     for name in ["traced.png", "points.ply", "field.npy", "frame.png", "report.json", "reconstruction-sharp.png"] {

@@ -4,6 +4,7 @@
 //! names one by connector, EDID, serial number or place. [`PanelWindow`] covers one monitor exactly and keeps it so;
 //! [`show`] does the whole for one frame, [`play`] for a sequence of them, [`serve`] for what other programs
 //! send.
+//! [`OperatorWindow`] is an ordinary window beside it, never on the panel's monitor.
 //! [`examine`] looks at everything that is known to spoil levels, and [`test_card`] shows it to an eye.
 //!
 //! # What is promised

@@ -236,6 +236,7 @@ fn operator(desk: &Desk) -> Ended {
     let beside = compare(desk, &event);
     screenshot(desk, "operator-eye.png");
     assert!(beside != far);
+    put_back(desk, &on_panel);
     // Nothing of it is anywhere else.
     assert!(desk.capture_monitor(&desk.plug(PANEL)) == on_panel, "the panel shows something else than its frame");
     assert!(desk.capture_monitor(&odd) == before, "another monitor was touched");
@@ -247,6 +248,39 @@ fn operator(desk: &Desk) -> Ended {
     let said = String::from_utf8_lossy(&refused.stderr);
     assert!(refused.status.code() == Some(2) && said.contains("cannot stand on the panel's monitor"), "{said}");
     assert!(!folder.path().join("holodrive-out").exists(), "a folder was left");
+    Ended::Passed
+}
+
+/// Moves the operator's window onto the panel's monitor: it does not stay there, and the panel's frame does.
+fn put_back(desk: &Desk, on_panel: &Picture) {
+    let plug = desk.plug(PANEL);
+    let ask = |arguments: &[&str]| {
+        let out = Command::new("xdotool").args(arguments).env("DISPLAY", desk.display()).output().expect("xdotool");
+        String::from_utf8_lossy(&out.stdout).into_owned()
+    };
+    let found = ask(&["search", "--name", "operator's view"]);
+    let window = found.lines().next().expect("the operator's window").to_owned();
+    let left = || -> Option<i64> {
+        let told = ask(&["getwindowgeometry", "--shell", &window]);
+        told.lines().find_map(|line| line.strip_prefix("X=")).and_then(|x| x.parse().ok())
+    };
+    let home = left().expect("place");
+    ask(&["windowmove", &window, &(plug.x + 100).to_string(), "100"]);
+    desk.wait_until("the operator's window is put back", || left().is_some_and(|x| x < home + 100));
+    desk.wait_for(&plug, on_panel);
+}
+
+/// The operator's window beside the panel, however windows are managed.
+pub(crate) fn beside(desk: &Desk) -> Ended {
+    if Command::new("xdotool").arg("version").output().is_err() {
+        return Ended::NotRun("xdotool is not installed".into());
+    }
+    let before = desk.capture_monitor(&desk.plug(OPERATOR));
+    let mut live = Live::start(desk, &["--operator", "auto"]);
+    live.full(desk, 1);
+    desk.wait_until("the operator's view is there", || desk.capture_monitor(&desk.plug(OPERATOR)) != before);
+    put_back(desk, &live.frame().1);
+    live.stop();
     Ended::Passed
 }
 
