@@ -52,10 +52,12 @@
 //! 13. [`encode`]: field to phase or fringes for a panel's levels and range
 //! 14. [`reconstruction`]: field to pictures, gray or in three lasers' colours, and how good they are
 //! 15. [`pipeline`]: the whole way, on one screen
-//! 16. [`comparison`]: all encodings side by side, with figures
-//! 17. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
-//! 18. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols, a local one for Python; the panel kept for them
-//! 19. [`display`]: monitors and the fullscreen window (feature `display`)
+//! 16. [`sequence`]: frames in time: prepared pictures, raw video and arrays; an animated scene, frame by frame
+//! 17. [`live`]: a hologram that follows its scene's file and the operator's keys, coarse at once and refined
+//! 18. [`comparison`]: all encodings side by side, with figures
+//! 19. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
+//! 20. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols, a local one for Python; the panel kept for them
+//! 21. [`display`]: monitors and the fullscreen window (feature `display`)
 
 pub mod comparison;
 #[cfg(feature = "display")]
@@ -66,6 +68,7 @@ pub mod field;
 pub mod files;
 pub mod hologram;
 pub mod illumination;
+pub mod live;
 pub mod panel;
 pub mod pipeline;
 pub mod points;
@@ -75,6 +78,7 @@ pub mod propagation;
 pub mod random;
 pub mod reconstruction;
 pub mod scene;
+pub mod sequence;
 pub mod serve;
 pub mod units;
 

@@ -12,14 +12,14 @@ use crate::panel::{Frame, PanelProfile};
 use crate::points::budget::{Budget, Limit, Rays, Resolution};
 use crate::points::colour::{Gamut, Lasers};
 use crate::points::exposure::{Exposed, Exposure};
-use crate::points::placement::{self, Phase, Placing, WorldPoint};
+use crate::points::placement::{self, Held, Phase, Placing, WorldPoint};
 use crate::points::trace::{self, TraceReport, TraceSettings, Traced};
 use crate::points::{self, Channel, Placed, Placement, PointCloud, PointSource};
 use crate::progress::Progress;
 use crate::propagation::Aperture;
 use crate::random::Random;
 use crate::reconstruction::ViewSettings;
-use crate::scene::{SceneBvh, gltf};
+use crate::scene::{Camera, SceneBvh, gltf};
 use glam::DVec3;
 use std::path::Path;
 
@@ -40,6 +40,8 @@ pub struct SceneSettings {
     pub phase: Phase,
     /// What is done with light brighter than a picture's white.
     pub exposure: Exposure,
+    /// What a sequence of frames holds still.
+    pub held: Held,
 }
 
 impl Default for SceneSettings {
@@ -52,6 +54,7 @@ impl Default for SceneSettings {
             placement: Placement::default(),
             phase: Phase::Random { seed: 1 },
             exposure: Exposure::Full,
+            held: Held::default(),
         }
     }
 }
@@ -105,11 +108,23 @@ pub fn light(
     progress.start("scene", 0);
     let loaded = gltf::load(scene, &settings.load)?;
     let camera = loaded.scene.cameras.first().ok_or_else(|| Error::input(scene, "has no camera"))?;
-    let aspect = f64::from(settings.trace.width) / f64::from(settings.trace.height);
-    let placing = settings.placement.prepare(&loaded.scene, camera, aspect, panel)?;
     let bvh = SceneBvh::new(&loaded.scene);
     let illumination = Illumination::new(&bvh, settings.illumination, progress)?;
-    let cast = |settings: &TraceSettings| trace::trace(&illumination, &placing.camera, settings, progress);
+    seen(scene, (&loaded, camera), &illumination, settings, (panel, wavelength), progress)
+}
+
+/// Light on surfaces → points before the panel, for a camera; `scene` stands in errors.
+pub fn seen(
+    scene: &Path,
+    (loaded, camera): (&gltf::Loaded, &Camera),
+    illumination: &Illumination,
+    settings: &SceneSettings,
+    (panel, wavelength): (&Grid, f64),
+    progress: &Progress,
+) -> Result<Lit> {
+    let aspect = f64::from(settings.trace.width) / f64::from(settings.trace.height);
+    let placing = settings.placement.prepare_for(&loaded.scene, &settings.held, camera, aspect, panel)?;
+    let cast = |settings: &TraceSettings| trace::trace(illumination, &placing.camera, settings, progress);
     let (traced, rays) = match settings.points {
         None => (cast(&settings.trace)?, None),
         Some(budget) => within_budget(budget, &settings.trace, cast, &placing, panel, wavelength)?,

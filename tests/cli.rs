@@ -215,6 +215,64 @@ fn bad_pictures_and_stacks_end_in_one_line() {
 }
 
 #[test]
+fn bad_sequences_end_in_one_line() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    fs::create_dir(f.join("empty")).expect("folder");
+    let motion = scene("motion.gltf");
+    refused(f, &["show", "empty"], "no frames");
+    refused(f, &["show", "gone.png", "gone-too.png"], "gone.png");
+    refused(f, &["show", "-"], "--raw");
+    refused(f, &["show", "-", "--raw", "20x10"], "1920×1080");
+    refused(f, &["show", "-", "--raw", "1920x1080", "--loop"], "cannot be played again");
+    refused(f, &["show", "-", "b.png", "--raw", "1920x1080"], "one input");
+    refused(f, &["show", "a.png", "b.npy"], "b.npy");
+    refused(f, &["show", &motion, "--fps", "0"], "fps");
+    refused(f, &["show", &motion, "--fps", "12", "--from", "3"], "no extent");
+    refused(f, &["show", &motion, "--fps", "12", "--animation", "run"], "run");
+    refused(f, &["show", &scene("cornell.gltf"), "--fps", "12"], "no animation");
+    refused(f, &["show", &motion, "--fps", "12", "--wavelengths", "638nm,520nm,450nm"], "wavelengths");
+    refused(f, &["show", &motion, "--fps", "12", "--subframes", "2"], "subframes");
+    refused(f, &["show", "p.ply", "--fps", "12"], "frames in time");
+    refused(f, &["show", &motion, "--ahead", "0"], "ahead");
+    refused(f, &["show", &motion, "--live"], "--monitor");
+    refused(f, &["show", &motion, "--live", "--monitor", "HDMI-1", "--fps", "12"], "--time");
+    refused(f, &["show", "p.ply", "--live", "--monitor", "HDMI-1"], "p.ply");
+    write(f, "short.npy", b"\x93NUMPY\x01\x00\x10\x00{'descr': '|u1'}");
+    refused(f, &["show", "short.npy"], "short.npy");
+}
+
+#[test]
+fn frames_in_time_on_the_simulated_panel_make_a_contact_sheet() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    let generic =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("calib/generic.toml")).expect("profile");
+    let small = generic.replace("width = 1920", "width = 96").replace("height = 1080", "height = 64");
+    write(f, "small.toml", small);
+    // Three frames of raw video and a part of a fourth.
+    write(f, "frames.raw", (0..3 * 96 * 64 + 100).map(|i: usize| (i % 251) as u8).collect::<Vec<u8>>());
+    let arguments = ["show", "frames.raw", "--raw", "96x64", "--panel", "small.toml", "-o", "out", "--json"];
+    let out = holodrive(f, &arguments);
+    let said = String::from_utf8_lossy(&out.stderr).to_string();
+    assert!(out.status.success() && said.contains("frame 3 is cut short, 100 of 6144 bytes"), "{said}");
+    let report: serde_json::Value = serde_json::from_slice(&out.stdout).expect("JSON");
+    assert_eq!(report["frames"], 3);
+    assert_eq!(report["contact_sheet"], serde_json::json!([0, 1, 2]));
+    assert_eq!(names(&f.join("out/frames")), ["frame-00000.png", "frame-00001.png", "frame-00002.png"]);
+    let sheet = image::open(f.join("out/contact.png")).expect("picture");
+    assert_eq!(sheet.width(), 3 * (240 + 6) + 6);
+    // What was written is a sequence again, with its own metadata: the panel need not be named.
+    let out = holodrive(f, &["show", "out/frames", "-o", "again", "--json"]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    for name in names(&f.join("out/frames")) {
+        let read = |folder: &str| image::open(f.join(folder).join("frames").join(&name)).expect("picture").into_luma8();
+        assert!(read("out") == read("again"), "{name}");
+    }
+    assert_eq!(image::open(f.join("again/contact.png")).expect("picture"), sheet);
+}
+
+#[test]
 fn a_reference_that_aliases_is_refused_with_numbers() {
     let folder = tempfile::tempdir().expect("folder");
     let f = folder.path();
@@ -407,6 +465,9 @@ fn every_command_of_the_readme_runs() {
     }
     for name in ["frame-red.png", "frame-green.png", "frame-blue.png", "field-red.npy", "reconstruction-sharp.png"] {
         assert!(f.join("colour").join(name).is_file(), "{name} is missing: {:?}", names(&f.join("colour")));
+    }
+    for name in ["motion/contact.png", "motion/frames/frame-00003.png", "again/contact.png"] {
+        assert!(f.join(name).is_file(), "{name} is missing");
     }
     for name in ["traced.png", "points.ply", "field.npy", "frame.png", "report.json", "reconstruction-sharp.png"] {
         assert!(

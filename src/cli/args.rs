@@ -11,6 +11,7 @@ pub(crate) use super::scene_args::{
     ColorArgs, DepthArg, FormFactorArg, MirrorDepthArg, PhaseArg, PlacementArg, PlacementArgs, SceneArgs, Wavelengths,
     White,
 };
+pub(crate) use super::sequence_args::{RawFormatArg, SequenceArgs};
 pub(crate) use super::serve_args::{OnClientGoneArg, ServeArgs, ServedLevelsArg};
 
 const EXIT_CODES: &str = "\
@@ -59,7 +60,7 @@ pub(crate) enum Command {
     Reconstruct(ReconstructArgs),
     /// The whole way: scene, points, field or frame → pictures on the simulated panel, or light on a real one.
     #[command(
-        after_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show scenes/cornell.gltf --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO"
+        after_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show scenes/cornell.gltf --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive show frames/ --monitor HDMI-1 --fps 30 --loop\n  holodrive show walk.glb --fps 12\n  holodrive show room.glb --monitor HDMI-1 --live\n  ffmpeg -i film.mp4 -vf scale=1920:1080 -f rawvideo -pix_fmt gray - | holodrive show - --raw 1920x1080 --monitor HDMI-1 --fps 24"
     )]
     Show(Box<ShowArgs>),
     /// Find a panel's curve and bend: frames to show, and what the measured numbers say.
@@ -377,17 +378,27 @@ pub(crate) enum PresenterArg {
     Software,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum AbsenceArg {
+    End,
+    Wait,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct ShowArgs {
-    /// A scene, a point cloud, a picture with depth (rgb.png+depth.png), a field, or a frame.
+    /// A scene, a point cloud, a picture with depth (rgb.png+depth.png), a field, a frame; or frames in time: a folder of
+    /// pictures, an array (frames × rows × columns, .npy), raw video (- for standard input).
     pub(crate) input: PathBuf,
+    /// Further pictures of frames, played in this order.
+    pub(crate) more: Vec<PathBuf>,
     /// Folder for pictures and data.
     #[arg(short, long, default_value = "holodrive-out", value_name = "DIR")]
     pub(crate) output: PathBuf,
     /// Show the frame fullscreen on this monitor (see `holodrive monitors`) instead of the simulated panel.
     #[arg(long, value_name = "NAME")]
     pub(crate) monitor: Option<String>,
-    /// How long to show it, in seconds [default: until Esc].
+    /// How long to show it (of frames in time: the last one), in seconds [default: until Esc; frames in time end with their
+    /// last].
     #[arg(long, value_name = "SECONDS")]
     pub(crate) hold: Option<f64>,
     /// Block the zero order within this angle of the axis, where the encoding's Fourier stop stands; 0deg lets it pass.
@@ -405,6 +416,18 @@ pub(crate) struct ShowArgs {
     /// What brings the levels to the screen.
     #[arg(long, value_enum, default_value_t = PresenterArg::Auto)]
     pub(crate) present: PresenterArg,
+    /// What is done when the monitor is unplugged or switched off.
+    #[arg(long, value_enum, default_value_t = AbsenceArg::End)]
+    pub(crate) on_absence: AbsenceArg,
+    /// Follow the scene: compute again when its file changes, or when keys move it (they stand in the operator's view); coarse
+    /// at once, finer while nothing moves.
+    #[arg(long, requires = "monitor")]
+    pub(crate) live: bool,
+    /// With --live: where the operator's view is shown, never on the panel's monitor: a monitor, auto or none.
+    #[arg(long, default_value = "auto", value_name = "MONITOR|auto|none")]
+    pub(crate) operator: String,
+    #[command(flatten)]
+    pub(crate) sequence: SequenceArgs,
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
     #[command(flatten)]

@@ -20,7 +20,7 @@ use std::path::Path;
 use std::time::Instant;
 
 /// Encoding settings for a kind of panel; `content` is where a field's light stands.
-fn encode_settings(
+pub(super) fn encode_settings(
     args: &EncodingArgs,
     panel: &Panel,
     content: Option<[f64; 2]>,

@@ -14,7 +14,7 @@ use holodrive::panel::{PanelProfile, Wavefront, wavefront};
 use holodrive::pipeline::{self, Lit, SceneSettings};
 use holodrive::points::colour::Lasers;
 use holodrive::points::exposure::Exposure;
-use holodrive::points::placement::Phase;
+use holodrive::points::placement::{Held, Phase};
 use holodrive::points::trace::{MirrorDepth, TraceSettings};
 use holodrive::points::{Channel, Placement, PointCloud, images, ply};
 use holodrive::progress::Progress;
@@ -136,6 +136,7 @@ pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, defau
             White::None => Exposure::Full,
             White::At(value) => Exposure::White(value),
         },
+        held: Held::default(),
     }
 }
 

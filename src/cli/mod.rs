@@ -1,14 +1,19 @@
 //! The command line: what was typed becomes settings, what was done becomes lines or JSON.
 
+mod animate;
 mod args;
 mod bar;
 mod bench;
 mod calibrate;
 mod colour;
 mod commands;
+#[cfg(feature = "display")]
+mod controls;
 mod encoding;
 mod layers;
 mod light;
+#[cfg(feature = "display")]
+mod live;
 mod load;
 mod monitors;
 mod parallax;
@@ -19,6 +24,8 @@ mod report;
 mod scene_args;
 #[cfg(feature = "display")]
 mod screen;
+mod sequence;
+mod sequence_args;
 mod serve;
 mod serve_args;
 mod show;

@@ -7,6 +7,7 @@ use super::commands::{content, origin, report_field, seen_half, write_traced, wr
 use super::encoding::encode_field;
 use super::load::{self, Input, Panel, Points, channel, hologram_settings, load_points, luminance_picture};
 use super::report::{Report, count, seconds};
+use super::sequence;
 use glam::DVec2;
 use holodrive::field::Field;
 use holodrive::field::npy::{self, Content};
@@ -36,6 +37,12 @@ pub(super) fn show(args: &ShowArgs) -> Result<Report> {
 fn run(args: &ShowArgs) -> Result<Report> {
     let begin = Instant::now();
     let mut report = Report::new("show");
+    if args.live {
+        return live(args, report);
+    }
+    if let Some(sequence) = sequence::asked(args)? {
+        return sequence::show(args, sequence, report);
+    }
     let source = load::input(&args.input)?;
     let panel = load::panel_in_color(&args.panel, &args.color, &mut report)?;
     let out = &args.output;
@@ -115,6 +122,31 @@ fn run(args: &ShowArgs) -> Result<Report> {
     finish(report, out)
 }
 
+#[cfg(feature = "display")]
+fn live(args: &ShowArgs, report: Report) -> Result<Report> {
+    let in_time = &args.sequence;
+    if in_time.fps.is_some()
+        || in_time.repeat
+        || in_time.from.is_some()
+        || in_time.to.is_some()
+        || !args.more.is_empty()
+    {
+        return Err(Error::parameter("live", "shows a scene at one --time; leave --fps, --loop, --from and --to out"));
+    }
+    if args.color.wavelengths.is_some() || args.subframes != 1 {
+        return Err(Error::parameter("live", "shows one frame of one laser; leave --wavelengths and --subframes out"));
+    }
+    match load::input(&args.input)? {
+        Input::Scene(path) => super::live::show(args, &path, report),
+        _ => Err(Error::input(&args.input, "is no scene (.gltf, .glb); --live follows a scene")),
+    }
+}
+
+#[cfg(not(feature = "display"))]
+fn live(_: &ShowArgs, _: Report) -> Result<Report> {
+    Err(Error::unsupported("this build has no display; build it with the feature `display` (the default)"))
+}
+
 /// The whole way in several frames that are seen as one.
 fn in_sub_frames(args: &ShowArgs, source: &Input, panel: &Panel, begin: Instant, mut report: Report) -> Result<Report> {
     super::subframes::check(args, panel)?;
@@ -177,7 +209,7 @@ fn in_color(
     finish(report, &args.output)
 }
 
-fn finish(mut report: Report, out: &Path) -> Result<Report> {
+pub(super) fn finish(mut report: Report, out: &Path) -> Result<Report> {
     report.add("output", out.display().to_string(), format!("pictures and data in {}", out.display()));
     let text = serde_json::to_string_pretty(&report.json()).unwrap_or_default();
     files::write_bytes(&out.join("report.json"), text.as_bytes())?;

@@ -4,6 +4,7 @@
 //! names one by connector, EDID, serial number or place. [`PanelWindow`] covers one monitor exactly and keeps it so;
 //! [`show`] does the whole for one frame, [`play`] for a sequence of them; [`ServedWindow`] is for what other programs
 //! send.
+//! [`OperatorWindow`] is an ordinary window beside it, never on the panel's monitor.
 //! [`examine`] looks at everything that is known to spoil levels, and [`test_card`] shows it to an eye.
 //!
 //! # What is promised
@@ -22,7 +23,9 @@ mod doctor;
 mod edid;
 mod frame;
 mod kernel;
+mod keys;
 mod monitor;
+mod operator;
 mod play;
 mod presenter;
 mod region;
@@ -40,7 +43,9 @@ mod x11;
 pub use doctor::{Finding, Severity, examine};
 pub use edid::{Edid, NativeMode};
 pub use frame::DisplayFrame;
+pub use keys::{Key, KeyPress};
 pub use monitor::{Gamma, Monitor, MonitorChoice, ScanOut};
+pub use operator::{OperatorChoice, OperatorStanding, OperatorWindow};
 pub use play::{FrameTime, PlayReport, PlaySettings, play};
 pub use presenter::Presenter;
 pub use serving::ServedWindow;

@@ -9,14 +9,18 @@ use super::window::{PanelWindow, Standing, WindowSettings};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use serde::Serialize;
+use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 
 /// Longest wait between two looks at the window's events and the stop flag.
 const TURN: Duration = Duration::from_millis(5);
 /// Assumed of a monitor that does not tell its refresh rate [Hz].
 const USUAL_REFRESH: f64 = 60.0;
+
+/// Frames of which the time that their presentation took is kept: the last ones of a long play.
+const MOST_TIMES: usize = 65_536;
 
 /// Rates that make sense [Hz]; their periods are durations that can be waited for.
 const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
@@ -36,6 +40,10 @@ pub struct PlaySettings {
     pub ahead: usize,
     /// What to do when the monitor goes away.
     pub on_absence: OnAbsence,
+    /// From a frame's being presented until the modulator has settled on it [s].
+    pub settle: f64,
+    /// The progress of whatever makes the frames: it is stopped when the play ends.
+    pub making: Option<Arc<Progress>>,
 }
 
 /// When one frame was due and came. Times are from the first frame [s], on a monotonic clock.
@@ -45,8 +53,12 @@ pub struct FrameTime {
     pub number: u64,
     /// When it should have been handed over: up to half a refresh before or after, at the nearest vertical blank.
     pub due: f64,
+    /// When it had been made; before the first was shown this is below zero.
+    pub ready: f64,
     /// When the window system had taken it.
     pub presented: f64,
+    /// When the modulator had settled on it; none where another frame came before.
+    pub settled: Option<f64>,
     /// Refreshes of the monitor by which it was handed over late.
     pub missed: u64,
     /// Whether it was late because it had not been made in time.
@@ -74,6 +86,11 @@ pub struct PlayReport {
     pub starved: u64,
     /// Frames that the window system would not take.
     pub refused: u64,
+    /// Frames that were replaced before the modulator had settled on them.
+    pub unsettled: u64,
+    /// From a frame's being handed over until the window system had taken it, of the last 65,536: the median, and the
+    /// longest [s].
+    pub presenting: [f64; 2],
     /// Mean time between frames [s].
     pub mean_interval: f64,
     /// Longest time between frames [s].
@@ -92,15 +109,15 @@ pub struct PlayReport {
 ///
 /// Frames are made on another thread, up to [`PlaySettings::ahead`] in advance. With the graphics presenter each waits for
 /// the vertical blank by itself; with the software presenter on X11 it is handed over just after one. `told` is called
-/// with each frame's times as soon as it was presented; a modulator has settled on it its own settle time later.
+/// with each frame's times, in their order, as soon as the modulator has settled on it, or when another frame comes before.
 ///
 /// # Errors
 ///
 /// Those of [`PanelWindow::open`]; the first error among `frames`; [`Error::Parameter`] for an empty sequence or a
-/// rate outside 0.001 to 10,000 Hz.
-pub fn play(
+/// rate outside 0.001 to 10,000 Hz; [`Error::Interrupted`] when it was stopped before the first frame.
+pub fn play<F: Into<Arc<DisplayFrame>>>(
     display: &mut Display,
-    frames: impl Iterator<Item = Result<DisplayFrame>> + Send,
+    frames: impl Iterator<Item = Result<F>> + Send,
     settings: &PlaySettings,
     told: &mut dyn FnMut(&FrameTime),
     progress: &Progress,
@@ -109,21 +126,50 @@ pub fn play(
         let (least, most) = (RATES.start(), RATES.end());
         return Err(Error::parameter("fps", format!("{rate} frames per second; give {least} to {most}")));
     }
+    if !(settings.settle.is_finite() && settings.settle >= 0.0) {
+        return Err(Error::parameter("settle", format!("{} s is no time to settle", settings.settle)));
+    }
     std::thread::scope(|scope| {
         let (sender, receiver) = sync_channel(settings.ahead.max(1));
         scope.spawn(move || {
             for frame in frames {
                 let failed = frame.is_err();
                 // The player has gone, or nothing can follow an error.
-                if sender.send(frame.map(Arc::new)).is_err() || failed {
+                let ready = frame.map(|frame| Ready { frame: frame.into(), at: Instant::now() });
+                if sender.send(ready).is_err() || failed {
                     break;
                 }
             }
         });
-        let first = receiver.recv().map_err(|_| Error::parameter("frames", "there is none to play"))??;
-        let player = Player::open(display, &first, settings)?;
-        player.run(display, &receiver, settings, told, progress)
+        let played = first(&receiver, progress)
+            .and_then(|first| Ok((Player::open(display, &first, settings)?, first)))
+            .and_then(|(player, first)| player.run(display, (first, &receiver), settings, told, progress));
+        // The thread ends when it sends in vain; what it is making it would finish first.
+        drop(receiver);
+        if let Some(making) = &settings.making {
+            making.stop();
+        }
+        played
     })
+}
+
+/// A frame that has been made.
+struct Ready {
+    frame: Arc<DisplayFrame>,
+    at: Instant,
+}
+
+/// Waits for the first frame.
+fn first(frames: &Receiver<Result<Ready>>, progress: &Progress) -> Result<Ready> {
+    loop {
+        match frames.recv_timeout(TURN) {
+            Ok(first) => return first,
+            Err(RecvTimeoutError::Timeout) => progress.check()?,
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(Error::parameter("frames", "there is none to play"));
+            }
+        }
+    }
 }
 
 struct Player {
@@ -139,6 +185,11 @@ struct Player {
     longest: f64,
     last: f64,
     counts: Counts,
+    /// Frames that are on the panel, or were, and have not been told of.
+    untold: VecDeque<FrameTime>,
+    settle: f64,
+    /// Of the last frames [s].
+    presenting: VecDeque<f64>,
 }
 
 #[derive(Default)]
@@ -146,6 +197,7 @@ struct Counts {
     missed: u64,
     starved: u64,
     refused: u64,
+    unsettled: u64,
 }
 
 /// Why the player stopped waiting.
@@ -159,7 +211,7 @@ enum Waited {
 /// What comes after a frame.
 enum Next {
     Frame {
-        frame: Arc<DisplayFrame>,
+        ready: Ready,
         starved: bool,
     },
     /// The sequence has ended.
@@ -168,9 +220,9 @@ enum Next {
 }
 
 impl Player {
-    fn open(display: &mut Display, first: &Arc<DisplayFrame>, settings: &PlaySettings) -> Result<Self> {
+    fn open(display: &mut Display, first: &Ready, settings: &PlaySettings) -> Result<Self> {
         let start = Instant::now();
-        let panel = PanelWindow::open(display, &settings.monitor, first, &settings.window)?;
+        let panel = PanelWindow::open(display, &settings.monitor, &first.frame, &settings.window)?;
         let refresh = 1.0 / panel.monitor().refresh.filter(|rate| RATES.contains(rate)).unwrap_or(USUAL_REFRESH);
         Ok(Self {
             presenter: panel.presenter().unwrap_or_default(),
@@ -182,6 +234,9 @@ impl Player {
             longest: 0.0,
             last: 0.0,
             counts: Counts::default(),
+            untold: VecDeque::new(),
+            settle: settings.settle,
+            presenting: VecDeque::new(),
             panel,
         })
     }
@@ -189,15 +244,17 @@ impl Player {
     fn run(
         mut self,
         display: &mut Display,
-        frames: &Receiver<Result<Arc<DisplayFrame>>>,
+        (first, frames): (Ready, &Receiver<Result<Ready>>),
         settings: &PlaySettings,
         told: &mut dyn FnMut(&FrameTime),
         progress: &Progress,
     ) -> Result<PlayReport> {
-        told(&FrameTime {
+        self.untold.push_back(FrameTime {
             number: 0,
             due: 0.0,
+            ready: self.since_origin(first.at),
             presented: 0.0,
+            settled: None,
             missed: 0,
             starved: false,
             taken: true,
@@ -207,30 +264,39 @@ impl Player {
         let early = if self.panel.tells_vertical_blanks() { 0.5 * self.refresh } else { 0.0 };
         let mut due = self.period;
         let end = loop {
-            match self.wait(display, Some(due - early), settings.on_absence, progress)? {
+            match self.wait(display, Some(due - early), (settings.on_absence, &mut *told), progress)? {
                 Waited::Due => {}
                 Waited::Returned => due = self.now(),
                 Waited::End(end) => break end,
             }
-            let (frame, starved) = match self.next(display, frames, settings.on_absence, progress)? {
-                Next::Frame { frame, starved } => (frame, starved),
-                Next::Over => break self.hold(display, settings, progress)?,
+            let (ready, starved) = match self.next(display, frames, (settings.on_absence, &mut *told), progress)? {
+                Next::Frame { ready, starved } => (ready, starved),
+                Next::Over => break self.hold(display, (settings, &mut *told), progress)?,
                 Next::End(end) => break end,
             };
             let vertical_blank = self.panel.wait_for_vertical_blank(Duration::from_secs_f64(2.0 * self.refresh))?;
             let handed_over = self.now();
-            let shown = self.panel.present(&frame)?;
-            let presented = (shown.at - self.origin).as_secs_f64();
+            // What is not settled now never will be.
+            self.tell(handed_over, true, told);
+            let shown = self.panel.present(&ready.frame)?;
+            let presented = self.since_origin(shown.at);
+            if self.presenting.len() == MOST_TIMES {
+                self.presenting.pop_front();
+            }
+            self.presenting.push_back(presented - handed_over);
             let missed = ((handed_over - due) / self.refresh).round().max(0.0) as u64;
-            told(&FrameTime {
+            self.untold.push_back(FrameTime {
                 number: shown.number,
                 due,
+                ready: self.since_origin(ready.at),
                 presented,
+                settled: None,
                 missed,
                 starved,
                 taken: shown.taken,
                 vertical_blank,
             });
+            self.tell(self.now(), false, told);
             self.counts.missed += missed;
             self.counts.starved += u64::from(starved);
             self.counts.refused += u64::from(!shown.taken);
@@ -240,26 +306,43 @@ impl Player {
             // rate its blanks set the time.
             due = if missed > 0 || settings.rate.is_none() { handed_over } else { due } + self.period;
         };
+        self.tell(self.now(), true, told);
         self.report(display, end)
+    }
+
+    /// Tells of the frames that have settled by `now`; of all where what has not is about to be replaced.
+    fn tell(&mut self, now: f64, all: bool, told: &mut dyn FnMut(&FrameTime)) {
+        while let Some(mut time) = self.untold.pop_front() {
+            let settles = time.presented + self.settle;
+            if settles <= now && time.taken {
+                time.settled = Some(settles);
+            } else if all || !time.taken {
+                self.counts.unsettled += u64::from(time.taken);
+            } else {
+                self.untold.push_front(time);
+                return;
+            }
+            told(&time);
+        }
     }
 
     /// Takes the next frame; waits for it where it has not been made yet.
     fn next(
         &mut self,
         display: &mut Display,
-        frames: &Receiver<Result<Arc<DisplayFrame>>>,
-        on_absence: OnAbsence,
+        frames: &Receiver<Result<Ready>>,
+        (on_absence, told): (OnAbsence, &mut dyn FnMut(&FrameTime)),
         progress: &Progress,
     ) -> Result<Next> {
         let mut starved = false;
         loop {
             match frames.try_recv() {
-                Ok(frame) => return Ok(Next::Frame { frame: frame?, starved }),
+                Ok(ready) => return Ok(Next::Frame { ready: ready?, starved }),
                 Err(TryRecvError::Disconnected) => return Ok(Next::Over),
                 Err(TryRecvError::Empty) => {
                     starved = true;
                     let soon = self.now() + 1e-3;
-                    if let Waited::End(end) = self.wait(display, Some(soon), on_absence, progress)? {
+                    if let Waited::End(end) = self.wait(display, Some(soon), (on_absence, &mut *told), progress)? {
                         return Ok(Next::End(end));
                     }
                 }
@@ -268,10 +351,15 @@ impl Player {
     }
 
     /// Keeps the last frame as long as asked, and at least its own time.
-    fn hold(&mut self, display: &mut Display, settings: &PlaySettings, progress: &Progress) -> Result<ShowEnd> {
+    fn hold(
+        &mut self,
+        display: &mut Display,
+        (settings, told): (&PlaySettings, &mut dyn FnMut(&FrameTime)),
+        progress: &Progress,
+    ) -> Result<ShowEnd> {
         let until = settings.hold.map(|hold| self.last + hold.as_secs_f64().max(self.period));
         loop {
-            match self.wait(display, until, settings.on_absence, progress)? {
+            match self.wait(display, until, (settings.on_absence, &mut *told), progress)? {
                 Waited::Due => return Ok(ShowEnd::Held),
                 Waited::End(end) => return Ok(end),
                 Waited::Returned => {}
@@ -283,12 +371,20 @@ impl Player {
         self.origin.elapsed().as_secs_f64()
     }
 
+    /// A time counted from the first frame [s].
+    fn since_origin(&self, at: Instant) -> f64 {
+        match at.checked_duration_since(self.origin) {
+            Some(after) => after.as_secs_f64(),
+            None => -(self.origin - at).as_secs_f64(),
+        }
+    }
+
     /// Waits until `due` (none: for ever), dealing with the window's events.
     fn wait(
         &mut self,
         display: &mut Display,
         due: Option<f64>,
-        on_absence: OnAbsence,
+        (on_absence, told): (OnAbsence, &mut dyn FnMut(&FrameTime)),
         progress: &Progress,
     ) -> Result<Waited> {
         let mut absent = false;
@@ -296,6 +392,7 @@ impl Player {
             if progress.stopped() {
                 return Ok(Waited::End(ShowEnd::Stopped));
             }
+            self.tell(self.now(), false, told);
             let left = due.map_or(TURN, |due| Duration::from_secs_f64((due - self.now()).max(0.0)));
             // The window system's own waiting is good to a millisecond or two.
             display.turn(left.saturating_sub(Duration::from_millis(2)).min(TURN))?;
@@ -324,8 +421,12 @@ impl Player {
         }
     }
 
-    fn report(self, display: &mut Display, end: ShowEnd) -> Result<PlayReport> {
+    fn report(mut self, display: &mut Display, end: ShowEnd) -> Result<PlayReport> {
         let frames = self.panel.frames();
+        let presenting = self.presenting.make_contiguous();
+        presenting.sort_by(f64::total_cmp);
+        let median = presenting.get(presenting.len() / 2).copied().unwrap_or(0.0);
+        let longest = presenting.last().copied().unwrap_or(0.0);
         let report = PlayReport {
             monitor: self.panel.monitor().clone(),
             presenter: self.presenter,
@@ -334,6 +435,8 @@ impl Player {
             missed: self.counts.missed,
             starved: self.counts.starved,
             refused: self.counts.refused,
+            unsettled: self.counts.unsettled,
+            presenting: [median, longest],
             mean_interval: if frames > 1 { self.last / (frames - 1) as f64 } else { 0.0 },
             longest_interval: self.longest,
             first_presented: self.first_presented,

@@ -1,6 +1,7 @@
 //! The connection to the window system, and the turning of its events.
 
 use super::kernel;
+use super::keys::{KeyPress, ends};
 use super::monitor::{Gamma, Monitor, ScanOut};
 use super::x11::X11;
 use crate::error::{Error, Result};
@@ -12,7 +13,7 @@ use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, KeyEvent, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, EventLoop};
-use winit::keyboard::{Key, ModifiersState, NamedKey};
+use winit::keyboard::ModifiersState;
 use winit::monitor::MonitorHandle;
 use winit::platform::pump_events::{EventLoopExtPumpEvents, PumpStatus};
 use winit::raw_window_handle::{HasDisplayHandle, RawDisplayHandle};
@@ -20,6 +21,8 @@ use winit::window::WindowId;
 
 /// Longest wait of a turn whose only purpose is to be inside the event loop.
 const TURN: Duration = Duration::from_millis(10);
+/// Keys that are kept for a window that does not ask for them.
+const MOST_KEYS: usize = 64;
 
 /// The window system: monitors, and windows on them.
 ///
@@ -46,6 +49,8 @@ pub(super) struct Inbox {
     pub(super) monitors_changed: bool,
     /// Its place or size, or that of other windows, may have changed.
     pub(super) windows_changed: bool,
+    /// Other keys that were pressed in it.
+    pub(super) keys: Vec<KeyPress>,
     /// The size that it must keep (columns, rows) [px].
     pub(super) size: (u32, u32),
     modifiers: ModifiersState,
@@ -233,7 +238,15 @@ impl<F: FnOnce(&ActiveEventLoop)> ApplicationHandler for Handler<'_, F> {
             WindowEvent::ModifiersChanged(modifiers) => inbox.modifiers = modifiers.state(),
             WindowEvent::KeyboardInput {
                 event: KeyEvent { logical_key, state: ElementState::Pressed, .. }, ..
-            } if ends(&logical_key, inbox.modifiers) => inbox.end_key = true,
+            } => {
+                if ends(&logical_key, inbox.modifiers) {
+                    inbox.end_key = true;
+                } else if let Some(press) = KeyPress::of(&logical_key, inbox.modifiers)
+                    && inbox.keys.len() < MOST_KEYS
+                {
+                    inbox.keys.push(press);
+                }
+            }
             WindowEvent::ScaleFactorChanged { mut inner_size_writer, .. } => {
                 // Unless told otherwise, winit resizes the window to keep its size in scaled pixels.
                 let (width, height) = inbox.size;
@@ -254,15 +267,5 @@ impl<F: FnOnce(&ActiveEventLoop)> ApplicationHandler for Handler<'_, F> {
         if let Some(action) = self.action.take() {
             action(event_loop);
         }
-    }
-}
-
-fn ends(key: &Key, modifiers: ModifiersState) -> bool {
-    match key {
-        Key::Named(NamedKey::Escape) => true,
-        Key::Character(text) => {
-            text.eq_ignore_ascii_case("q") || (modifiers.control_key() && text.eq_ignore_ascii_case("c"))
-        }
-        _ => false,
     }
 }

@@ -1,6 +1,7 @@
 //! A window that covers one monitor exactly, one window pixel on each monitor pixel, and never any other.
 
 use super::frame::DisplayFrame;
+use super::keys::KeyPress;
 use super::monitor::{Monitor, MonitorChoice};
 use super::presenter::{Presenter, Surface};
 use super::session::{Display, Inbox};
@@ -150,6 +151,11 @@ impl PanelWindow {
     /// How often another window had come above and was covered again.
     pub fn covered(&self) -> u64 {
         self.covered
+    }
+
+    /// Keys pressed in it since the last call, beside those that end the show.
+    pub fn keys(&mut self) -> Vec<KeyPress> {
+        self.open.as_ref().map(|open| std::mem::take(&mut open.inbox.borrow_mut().keys)).unwrap_or_default()
     }
 
     /// What alters levels on this monitor, where that was allowed.
@@ -375,7 +381,7 @@ fn unmanaged(attributes: WindowAttributes) -> WindowAttributes {
     attributes
 }
 
-fn x11_id(window: &Window) -> Option<u32> {
+pub(super) fn x11_id(window: &Window) -> Option<u32> {
     match window.window_handle().ok()?.as_raw() {
         RawWindowHandle::Xlib(handle) => u32::try_from(handle.window).ok(),
         RawWindowHandle::Xcb(handle) => Some(handle.window.get()),

@@ -67,6 +67,7 @@ pub(super) fn pattern(field: &Field, settings: &DoublePhase, progress: &Progress
         Some(percentile) => percentile,
         None => best_percentile(&target, settings)?,
     };
+    progress.check()?;
     let greatest = amplitude_at(&target, percentile)?;
     if greatest == 0.0 {
         let what = "no light within the encoding's band; widen it, or move the object nearer to the panel's axis";

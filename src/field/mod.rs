@@ -4,6 +4,7 @@ pub mod fft;
 pub mod grid;
 mod memory;
 pub mod npy;
+pub mod npy_stack;
 
 pub use fft::{Fft2, plans};
 pub use grid::Grid;

@@ -85,6 +85,56 @@ impl Frame {
 }
 
 impl VideoFrame {
+    /// Reads a picture of a video signal that carries several frames, as it is; `None` where the picture is drive levels, or
+    /// the panel's packing carries one frame. `profile` overrules what the file says where it was `named`.
+    ///
+    /// # Errors
+    /// As [`Frame::read`].
+    pub fn read_packed(
+        path: &Path,
+        profile: &PanelProfile,
+        named: bool,
+        wavelength: Option<f64>,
+    ) -> Result<Option<Self>> {
+        if named && profile.signal.packing.frames() == 1 {
+            return Ok(None);
+        }
+        let bytes = std::fs::read(path).map_err(Error::io(path))?;
+        let mut panel = profile.clone();
+        if !named && bytes.starts_with(b"\x89PNG") {
+            // Metadata stand before the pixels.
+            let fail = |e: png::DecodingError| Error::input(path, format!("not a readable PNG: {e}"));
+            let reader = png::Decoder::new(Cursor::new(&bytes[..])).read_info().map_err(fail)?;
+            if let Some(metadata) = text_chunk(path, reader.info())? {
+                panel = metadata.panel;
+            }
+        }
+        let layout = &panel.signal;
+        if layout.packing.frames() == 1 {
+            return Ok(None);
+        }
+        let (picture, metadata) = decode(path, &bytes)?;
+        let packed = metadata.as_ref().and_then(|m| m.applied.packing.as_deref());
+        let rgb = match picture {
+            Picture::Rgb { width, height, rgb }
+                if (width, height) == (layout.width, layout.height) && (packed.is_some() || !is_gray(&rgb)) =>
+            {
+                rgb
+            }
+            _ => return Ok(None),
+        };
+        if let Some(name) = packed.filter(|name| *name != layout.packing.name()) {
+            let what = format!("packed as {name}, but {} takes {}", panel.name, layout.packing.name());
+            return Err(Error::input(path, what));
+        }
+        let at = wavelength.or(metadata.as_ref().map(|m| m.wavelength)).unwrap_or(panel.default_wavelength());
+        let mut metadata = metadata.unwrap_or_else(|| FrameMetadata::new(&panel, at));
+        metadata.applied.packing = Some(layout.packing.name().into());
+        let (width, height) = (layout.width, layout.height);
+        metadata.panel = panel;
+        Ok(Some(Self { width, height, rgb, metadata }))
+    }
+
     /// Writes an RGB PNG of the video signal with the metadata; the file appears whole or not at all.
     pub fn write(&self, path: &Path) -> Result<()> {
         let size = (self.width, self.height);

@@ -58,6 +58,16 @@ pub enum Phase {
     Path,
 }
 
+/// What does not change from frame to frame of a sequence, so that what stands still in the scene stands still before
+/// the panel. `None`: what the one scene at hand says.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Held {
+    /// Box of the scene in all its poses (low, high) [m]: what a camera that the file lacks frames, and what is fitted.
+    pub bounds: Option<(DVec3, DVec3)>,
+    /// Camera distances [m] that stand at the nearest and farthest depth of a window; points beyond stand there too.
+    pub depths: Option<[f64; 2]>,
+}
+
 /// A placement made definite for one scene, camera and panel.
 #[derive(Clone, Debug)]
 pub struct Placing {
@@ -74,7 +84,7 @@ pub struct Placing {
 
 #[derive(Clone, Debug)]
 enum Map {
-    Window { near: f64, far: f64 },
+    Window { near: f64, far: f64, held: Option<[f64; 2]> },
     Model { hologram_from_world: DMat4 },
 }
 
@@ -104,6 +114,21 @@ impl Placement {
     /// # Errors
     /// [`Error::Parameter`] for an eye that is not in front of panel and points, or an inverted depth range.
     pub fn prepare(&self, scene: &Scene, camera: &Camera, picture_aspect: f64, panel: &Grid) -> Result<Placing> {
+        self.prepare_for(scene, &Held::default(), camera, picture_aspect, panel)
+    }
+
+    /// As [`Placement::prepare`], with what is held still over the frames of a sequence.
+    ///
+    /// # Errors
+    /// As [`Placement::prepare`].
+    pub fn prepare_for(
+        &self,
+        scene: &Scene,
+        held: &Held,
+        camera: &Camera,
+        picture_aspect: f64,
+        panel: &Grid,
+    ) -> Result<Placing> {
         let (width, height) = (panel.extent_x(), panel.extent_y());
         let (eye, frontmost) = match *self {
             Self::Window { eye, near, .. } => (eye, near),
@@ -123,7 +148,7 @@ impl Placement {
                     let what = format!("near {near} m and far {far} m (z): far must be at or behind near");
                     return Err(Error::parameter("near/far", what));
                 }
-                let map = Map::Window { near, far };
+                let map = Map::Window { near, far, held: held.depths };
                 Ok(Placing {
                     camera: camera.clone(),
                     aspect: picture_aspect,
@@ -134,7 +159,7 @@ impl Placement {
             }
             Self::Model { eye, z, scale } => {
                 let axes = DMat3::from_mat4(camera.world_from_camera);
-                let (center, half) = box_along(scene, axes)
+                let (center, half) = box_along(scene, held.bounds, axes)
                     .ok_or_else(|| Error::parameter("placement", "the scene has no triangles to place"))?;
                 let scale = match scale {
                     Some(scale) if scale.is_finite() && scale > 0.0 => scale,
@@ -160,10 +185,15 @@ impl Placement {
     }
 }
 
-/// Middle (world) and half size (along `axes`) of the scene's box [m].
-fn box_along(scene: &Scene, axes: DMat3) -> Option<(DVec3, DVec3)> {
+/// Middle (world) and half size (along `axes`) of the scene's box, or of one that is held [m].
+fn box_along(scene: &Scene, held: Option<(DVec3, DVec3)>, axes: DMat3) -> Option<(DVec3, DVec3)> {
     let inverse = axes.transpose();
-    let bounds = scene.triangles.iter().flat_map(|t| t.corners()).map(|p| inverse * p).fold(None, |b, p| match b {
+    let corner = |i: usize, (low, high): (DVec3, DVec3)| {
+        DVec3::select(glam::BVec3::new(i & 1 == 0, i & 2 == 0, i & 4 == 0), low, high)
+    };
+    let own = scene.triangles.iter().filter(|_| held.is_none()).flat_map(|t| t.corners());
+    let held = held.into_iter().flat_map(|ends| (0..8).map(move |i| corner(i, ends)));
+    let bounds = held.chain(own).map(|p| inverse * p).fold(None, |b, p| match b {
         None => Some((p, p)),
         Some((low, high)) => Some((p.min(low), p.max(high))),
     });
@@ -231,17 +261,18 @@ impl Placing {
             Map::Model { hologram_from_world } => {
                 points.iter().map(|p| hologram_from_world.transform_point3(p.position)).collect()
             }
-            Map::Window { near, far } => self.through_window(points, *near, *far),
+            Map::Window { near, far, held } => self.through_window(points, (*near, *far), *held),
         }
     }
 
-    fn through_window(&self, points: &[WorldPoint], near: f64, far: f64) -> Vec<DVec3> {
+    fn through_window(&self, points: &[WorldPoint], (near, far): (f64, f64), held: Option<[f64; 2]>) -> Vec<DVec3> {
         let camera_from_world = self.camera.world_from_camera.inverse();
         let seen: Vec<DVec3> = points.iter().map(|p| camera_from_world.transform_point3(p.position)).collect();
         let (half_width, half_height) = self.camera.half_size(self.aspect);
         let depths = seen.iter().map(|p| -p.z);
-        let nearest = depths.clone().fold(f64::INFINITY, f64::min);
-        let farthest = depths.fold(f64::NEG_INFINITY, f64::max);
+        let [nearest, farthest] = held.unwrap_or_else(|| {
+            [depths.clone().fold(f64::INFINITY, f64::min), depths.fold(f64::NEG_INFINITY, f64::max)]
+        });
         let perspective = matches!(self.camera.projection, Projection::Perspective { .. });
         // 1/(E − z) = α + β·s with s = 1/w: exact at both ends of the depth range.
         let s = |w: f64| if perspective { 1.0 / w } else { w };
@@ -251,7 +282,8 @@ impl Placing {
         seen.iter()
             .map(|p| {
                 let w = -p.z;
-                let value = reach(near) + slope * (s(w) - near_s);
+                // Beyond depths that are held a point stands on the nearest or farthest plane.
+                let value = reach(near) + slope * (s(w.clamp(nearest, farthest)) - near_s);
                 let z = if perspective { self.eye.z - 1.0 / value } else { value };
                 let (x, y) = if perspective { (p.x / w, p.y / w) } else { (p.x, p.y) };
                 let spread = (self.eye.z - z) / self.eye.z;

@@ -14,7 +14,7 @@ mod picture;
 pub use colour::{ColorLight, ColorPicture};
 pub use flat_field::Cone;
 pub use orders::{Orders, orders};
-pub use picture::{Picture, Scale, read_gray, write_rgb_png};
+pub use picture::{Picture, Scale, read_gray, write_coded_png, write_rgb_png};
 
 use crate::error::{Error, Result};
 use crate::field::{Field, Grid};

@@ -126,6 +126,11 @@ pub fn write_rgb_png(
     write_png(path, width, height, png::ColorType::Rgb, &bytes, texts)
 }
 
+/// Writes 8-bit RGB that is sRGB-coded already, with text chunks (keyword, text).
+pub fn write_coded_png(path: &Path, width: usize, height: usize, rgb: &[u8], texts: &[(&str, String)]) -> Result<()> {
+    write_png(path, width, height, png::ColorType::Rgb, rgb, texts)
+}
+
 fn write_png(
     path: &Path,
     width: usize,

@@ -6,6 +6,7 @@ use crate::server::{ODD_PANEL, OPERATOR, PANEL};
 use crate::{Case, Ended};
 use holodrive::panel::{Frame, PanelProfile};
 use holodrive::random::Random;
+use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -16,7 +17,7 @@ pub(crate) const CASES: &[Case] = &[
     ("every_line_of_python_in_the_readme_runs_on_a_served_panel", python),
 ];
 
-fn program(desk: &Desk, folder: &Path, arguments: &[&str]) -> Command {
+pub(crate) fn program(desk: &Desk, folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_holodrive"));
     command.args(arguments).current_dir(folder).env("DISPLAY", desk.display()).env_remove("WAYLAND_DISPLAY");
     command
@@ -75,6 +76,11 @@ fn show(desk: &Desk) -> Ended {
 fn readme(desk: &Desk) -> Ended {
     let folder = tempfile::tempdir().expect("folder");
     frame(folder.path());
+    crate::sequences::numbered_frames(&folder.path().join("frames"), 3);
+    std::fs::create_dir(folder.path().join("scenes")).expect("folder");
+    let scene = Path::new("scenes/motion.gltf");
+    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join(scene);
+    std::fs::copy(from, folder.path().join(scene)).expect("copy");
     let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md");
     let mut inside = false;
     let mut run = 0;
@@ -84,9 +90,20 @@ fn readme(desk: &Desk) -> Ended {
         } else if inside && !line.trim().is_empty() {
             // The README's monitor is called as most are; here it is the dummy driver's.
             let line = line.replace("HDMI-1", PANEL);
+            // What would come through a pipe comes from here: two frames of raw video.
+            let (piped, line) = match line.split_once(" | ") {
+                Some((_, line)) => (true, line.to_owned()),
+                None => (false, line),
+            };
             let words: Vec<&str> = line.split(" #").next().unwrap_or("").split_whitespace().collect();
             assert_eq!(words[0], "holodrive", "{line}");
-            let out = program(desk, folder.path(), &words[1..]).output().expect("runs");
+            let mut command = program(desk, folder.path(), &words[1..]);
+            command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+            let mut running = command.spawn().expect("runs");
+            if let (true, Some(input)) = (piped, &mut running.stdin) {
+                input.write_all(&vec![100; 2 * 1920 * 1080]).expect("the program reads");
+            }
+            let out = running.wait_with_output().expect("ends");
             assert!(out.status.success(), "{line}: {}", String::from_utf8_lossy(&out.stderr));
             run += 1;
         }

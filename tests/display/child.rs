@@ -99,6 +99,8 @@ fn run(job: Job) -> holodrive::Result<serde_json::Value> {
                 hold: job.hold.map(Duration::from_secs_f64),
                 ahead: 4,
                 on_absence: OnAbsence::End,
+                settle: 0.02,
+                making: None,
             };
             let frames = (0..count).map(|number| Ok(Picture::numbered(number, job.width, job.height).frame()));
             let mut times = Vec::new();

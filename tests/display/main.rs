@@ -10,9 +10,11 @@ mod binary;
 mod child;
 mod desk;
 mod frames;
+mod live;
 mod monitors;
 mod ownership;
 mod pixels;
+mod sequences;
 mod server;
 #[cfg(unix)]
 mod serving;
@@ -48,6 +50,8 @@ fn main() -> ExitCode {
         pixels::CASES,
         ownership::CASES,
         timing::CASES,
+        sequences::CASES,
+        live::CASES,
         #[cfg(unix)]
         serving::CASES,
         window_manager::CASES,

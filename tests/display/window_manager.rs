@@ -1,7 +1,7 @@
 //! The same again under a window manager: it must neither move, resize, cover nor keep the panel's window.
 
 use crate::desk::Desk;
-use crate::{Case, Ended, ownership, pixels};
+use crate::{Case, Ended, live, ownership, pixels};
 use std::process::{Child, Command, Stdio};
 
 pub(crate) const CASES: &[Case] = &[
@@ -14,6 +14,7 @@ pub(crate) const CASES: &[Case] = &[
     }),
     ("under_a_window_manager_unplugging_touches_no_other_monitor", |desk| under_openbox(desk, ownership::unplugged)),
     ("under_a_window_manager_unplugging_is_waited_out", |desk| under_openbox(desk, ownership::replugged)),
+    ("under_a_window_manager_the_operators_view_stays_off_the_panel", |desk| under_openbox(desk, live::beside)),
     ("under_a_window_manager_escape_ends_the_show", |desk| under_openbox(desk, ownership::escape)),
 ];
 

@@ -9,4 +9,5 @@ mod fuzz;
 mod malformed;
 mod materials;
 mod own_scenes;
+mod played;
 mod third_party;

@@ -14,7 +14,7 @@ from pathlib import Path
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 ARRAY, ELEMENTS = 34962, 34963  # GL buffer targets
-U16, F32 = 5123, 5126  # GL component types
+U8, U16, F32 = 5121, 5123, 5126  # GL component types
 
 
 class Gltf:
@@ -30,6 +30,7 @@ class Gltf:
             "scenes": [{"name": name, "nodes": []}],
             "nodes": [], "cameras": [], "meshes": [], "materials": [],
             "textures": [], "samplers": [], "images": [],
+            "skins": [], "animations": [],
             "accessors": [], "bufferViews": [], "buffers": [],
         }
 
@@ -81,6 +82,25 @@ class Gltf:
 
     def add_node(self, name, **properties):
         self.document["scenes"][0]["nodes"].append(self.add("nodes", {"name": name, **properties}))
+
+    def add_values(self, rows, kind, component=("f", F32), bounds=False):
+        """An accessor of rows of numbers that is no plain vertex data."""
+        code, component = component
+        flat = [x for row in rows for x in row]
+        accessor = {"bufferView": self.add_view(struct.pack(f"<{len(flat)}{code}", *flat)), "componentType": component,
+                    "count": len(rows), "type": kind}
+        if bounds:
+            accessor["min"], accessor["max"] = ([f(column) for column in zip(*rows)] for f in (min, max))
+        return self.add("accessors", accessor)
+
+    def add_animation(self, name, times, channels):
+        """Channels are (node, path, kind, values), linear between the times."""
+        times = self.add_values([(t,) for t in times], "SCALAR", bounds=True)
+        samplers = [{"input": times, "output": self.add_values(values, kind), "interpolation": "LINEAR"}
+                    for _, _, kind, values in channels]
+        targets = [{"sampler": i, "target": {"node": node, "path": path}}
+                   for i, (node, path, _, _) in enumerate(channels)]
+        return self.add("animations", {"name": name, "channels": targets, "samplers": samplers})
 
     def add_camera(self, yfov, position):
         camera = {"type": "perspective", "perspective": {"yfov": yfov, "aspectRatio": 1.0, "znear": 0.01, "zfar": 100.0}}
@@ -355,9 +375,54 @@ def glass_block():
     scene.write(embed=True)
 
 
+def motion():
+    scene = Gltf("motion", "Two seconds of all that moves in glTF, glowing: the letter F slides to the right and back "
+                 "(node), a mast below it on the left sways (skin), a plate on the right grows wide and narrow (morph). "
+                 "They stand 2.0, 2.4 and 2.8 m before a camera that stands still. The clip `still` moves nothing.")
+    glow = [scene.add("materials", {**emitter(name, colour, 1.0), "doubleSided": True})
+            for name, colour in (("white", (1.0, 1.0, 1.0)), ("yellow", (1.0, 0.8, 0.3)), ("blue", (0.4, 0.7, 1.0)))]
+
+    def bars(rectangles):
+        corners = [(x, y, 0.0) for l, b, r, t in rectangles for x, y in ((l, b), (r, b), (r, t), (l, t))]
+        triangles = [t for i in range(0, len(corners), 4) for t in ((i, i + 1, i + 2), (i, i + 2, i + 3))]
+        return corners, [(0.0, 0.0, 1.0)] * len(corners), triangles
+
+    letter = scene.add_shape(*bars([(-0.5, -0.7, -0.2, 0.7), (-0.2, 0.42, 0.5, 0.7), (-0.2, -0.08, 0.3, 0.18)]))
+    scene.add_node("letter", mesh=scene.add_mesh("letter", letter, glow[0]), translation=[-0.55, 0.5, -2.0],
+                   scale=[0.5] * 3)
+    # The mast: four segments on two joints, each vertex's weight passing from the lower to the upper one.
+    corners = [(x, 0.3 * k, 0.0) for k in range(5) for x in (-0.09, 0.09)]
+    triangles = [t for k in range(4) for a in [2 * k] for t in ((a, a + 1, a + 3), (a, a + 3, a + 2))]
+    shape = scene.add_shape(corners, [(0.0, 0.0, 1.0)] * len(corners), triangles)
+    shape["attributes"]["JOINTS_0"] = scene.add_values([(0, 1, 0, 0)] * len(corners), "VEC4", ("B", U8))
+    weights = [(1 - k / 4, k / 4, 0.0, 0.0) for k in range(5) for _ in range(2)]
+    shape["attributes"]["WEIGHTS_0"] = scene.add_values(weights, "VEC4")
+    upper = scene.add("nodes", {"name": "upper joint", "translation": [0.0, 0.6, 0.0]})
+    lower = scene.add("nodes", {"name": "lower joint", "translation": [-0.6, -1.05, -2.4], "children": [upper]})
+    scene.document["scenes"][0]["nodes"].append(lower)
+    unbind = [(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -y, 0, 1) for y in (0.0, 0.6)]
+    skin = scene.add("skins", {"joints": [lower, upper], "inverseBindMatrices": scene.add_values(unbind, "MAT4")})
+    scene.add_node("mast", mesh=scene.add_mesh("mast", shape, glow[1]), skin=skin)
+    corners, normals, triangles = bars([(-0.3, -0.3, 0.3, 0.3)])
+    plate = scene.add_mesh("plate", scene.add_shape(corners, normals, triangles), glow[2])
+    wide = scene.add_vectors([(math.copysign(0.35, x), 0.0, 0.0) for x, _, _ in corners])
+    scene.document["meshes"][plate]["primitives"][0]["targets"] = [{"POSITION": wide}]
+    scene.add_node("plate", mesh=plate, translation=[0.62, -0.65, -2.8])
+    turned = [(0.0, 0.0, math.sin(a / 2), math.cos(a / 2)) for a in map(math.radians, (50, -50, 50))]
+    scene.add_animation("motion", [0.0, 1.0, 2.0], [
+        (0, "translation", "VEC3", [(-0.55, 0.5, -2.0), (0.55, 0.5, -2.0), (-0.55, 0.5, -2.0)]),
+        (upper, "rotation", "VEC4", turned),
+        (scene.document["scenes"][0]["nodes"][-1], "weights", "SCALAR", [(0.0,), (1.0,), (0.0,)]),
+    ])
+    scene.add_animation("still", [0.0, 2.0], [(0, "translation", "VEC3", [(-0.55, 0.5, -2.0)] * 2)])
+    scene.add_camera(2 * math.atan(0.5), [0.0, 0.0, 0.0])
+    scene.write(embed=True)
+
+
 if __name__ == "__main__":
     SCENES.mkdir(exist_ok=True)
     cornell()
     mirror_ball()
     depth_chart()
     glass_block()
+    motion()

@@ -123,6 +123,19 @@ fn chosen_clip<'a>(document: &'a Document, clip: &Clip) -> Result<Option<&'a jso
     }
 }
 
+/// First and last key time of a clip [s].
+pub(super) fn times(document: &Document, clip: &Clip) -> Result<Option<[f64; 2]>> {
+    let Some(animation) = chosen_clip(document, clip)? else { return Ok(None) };
+    let mut ends: Option<[f64; 2]> = None;
+    for (i, sampler) in animation.samplers.iter().enumerate() {
+        let keys = document.vectors::<1>(sampler.input, &format!("animation sampler {i}"))?;
+        for time in keys.iter().map(|key| f64::from(key[0])).filter(|time| time.is_finite()) {
+            ends = Some(ends.map_or([time; 2], |[first, last]| [first.min(time), last.max(time)]));
+        }
+    }
+    Ok(ends)
+}
+
 /// Where a time lies among key times.
 struct Position {
     /// The key at or before the time (or the first one).

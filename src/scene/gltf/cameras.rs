@@ -25,6 +25,7 @@ pub(super) fn read(
     nodes: &Nodes,
     choice: Option<&Choice>,
     triangles: &[Triangle],
+    framed: Option<[DVec3; 8]>,
     warnings: &mut Vec<Warning>,
 ) -> Result<Vec<Camera>> {
     let (mut cameras, mut names) = (Vec::new(), Vec::new());
@@ -53,7 +54,10 @@ pub(super) fn read(
     }
     if cameras.is_empty() {
         warnings.push(Warning("the file has no camera; one that frames the scene is used".to_owned()));
-        cameras.push(framing(triangles));
+        cameras.push(match framed {
+            Some(corners) => framing(|| corners.into_iter()),
+            None => framing(|| triangles.iter().flat_map(Triangle::corners)),
+        });
     }
     Ok(cameras)
 }
@@ -93,9 +97,8 @@ pub(super) fn rigid(transform: DMat4) -> Option<(DMat4, bool)> {
     Some((DMat4::from_mat3_translation(axes, transform.w_axis.truncate()), m.determinant() < 0.0))
 }
 
-/// A camera from which a square picture just holds all triangles.
-fn framing(triangles: &[Triangle]) -> Camera {
-    let corners = || triangles.iter().flat_map(Triangle::corners);
+/// A camera from which a square picture just holds all corners.
+fn framing<C: Iterator<Item = DVec3>>(corners: impl Fn() -> C) -> Camera {
     let first = corners().next().unwrap_or_default();
     let (low, high) = corners().fold((first, first), |(low, high), p| (low.min(p), high.max(p)));
     let centre = 0.5 * (low + high);

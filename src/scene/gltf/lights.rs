@@ -75,11 +75,11 @@ pub(super) fn ensure_light(
     document: &Document,
     scene: &mut Scene,
     used: &UsedMaterials,
-    wanted: bool,
+    (wanted, framed): (bool, Option<(DVec3, DVec3)>),
     warnings: &mut Vec<Warning>,
 ) -> Result<()> {
     if wanted {
-        viewer_light(scene);
+        viewer_light(scene, framed);
         return Ok(());
     }
     // The coarsest level is the mean of the picture: some exporters write full emission times a black picture.
@@ -105,7 +105,7 @@ pub(super) fn ensure_light(
              zero, or remove them all for a default light",
         ));
     }
-    viewer_light(scene);
+    viewer_light(scene, framed);
     warnings.push(Warning(format!(
         "the file has no light; it is lit by a directional light of {KEY_IRRADIANCE} W/m² from the viewer's upper left \
          and a point light at the camera that gives {FILL_IRRADIANCE} W/m² at the middle of the scene"
@@ -114,11 +114,11 @@ pub(super) fn ensure_light(
 }
 
 /// Adds the light of a file without any.
-fn viewer_light(scene: &mut Scene) {
+fn viewer_light(scene: &mut Scene, framed: Option<(DVec3, DVec3)>) {
     let camera = &scene.cameras[0];
     let eye = camera.eye();
     let from = camera.world_from_camera.transform_vector3(KEY_FROM.normalize());
-    let (low, high) = scene.bounds().unwrap_or_default();
+    let (low, high) = framed.or(scene.bounds()).unwrap_or_default();
     // A camera inside the scene is nearer to its middle than to what it sees; half the diagonal is a fair distance.
     let distance = eye.distance(0.5 * (low + high)).max(0.5 * high.distance(low)) as f32;
     scene.lights.push(PunctualLight {

@@ -39,9 +39,12 @@ pub use images::{MAX_TEXELS, MAX_TEXTURE_SIDE};
 pub use meshes::{MAX_COORDINATE, MAX_TRIANGLES};
 pub use resources::MAX_FILE_BYTES;
 
-use super::{Scene, Warning};
+use super::{Material, Scene, Texture, Warning};
 use crate::error::{Error, Result};
-use std::path::Path;
+use document::Document;
+use glam::DVec3;
+use meshes::UsedMaterials;
+use std::path::{Path, PathBuf};
 
 /// One of several things in a file, by its name or its number from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -85,6 +88,9 @@ pub struct LoadOptions {
     pub time: f64,
     /// Whether the light that a file without any gets is added to the file's own.
     pub viewer_light: bool,
+    /// Box (low, high) [m] for which the camera and the light are made that a file without them gets; `None`: that of the
+    /// scene as it is posed. An animation whose poses are to be seen by one camera gives the box of all of them.
+    pub framed: Option<(DVec3, DVec3)>,
 }
 
 /// A scene and what had to be assumed to make it.
@@ -109,20 +115,101 @@ pub struct Loaded {
 /// passes a limit, or has lights that all have no intensity; [`Error::Parameter`] for a camera, scene, clip or time
 /// that the file does not have.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
-    if !options.time.is_finite() {
-        return Err(Error::parameter("--time", format!("{} is not a time; give seconds, such as 1.5s", options.time)));
+    File::open(path)?.pose(options)
+}
+
+/// A file that was read once and is posed at several times: its buffers are kept, and its textures once decoded.
+pub struct File {
+    document: Document,
+    warnings: Vec<Warning>,
+    decoded: Option<Decoded>,
+}
+
+/// Materials for the triangles of one pose, and what there was to say about them.
+struct Decoded {
+    used: UsedMaterials,
+    materials: Vec<Material>,
+    textures: Vec<Texture>,
+    warnings: Vec<Warning>,
+}
+
+impl File {
+    /// Reads the file and its buffers.
+    ///
+    /// # Errors
+    ///
+    /// As [`load`], as far as no pose is needed to see it.
+    pub fn open(path: &Path) -> Result<Self> {
+        let mut warnings = Vec::new();
+        let document = Document::open(path, &mut warnings)?;
+        Ok(Self { document, warnings, decoded: None })
     }
-    let mut warnings = Vec::new();
-    let document = document::Document::open(path, &mut warnings)?;
-    let pose = animation::Pose::new(&document, &options.clip, options.time)?;
-    let nodes = nodes::Nodes::new(&document, &pose, options.scene.as_ref())?;
 
-    let (triangles, used_materials) = meshes::triangles(&document, &nodes, &pose, &mut warnings)?;
-    let (materials, textures) = materials::read(&document, &used_materials, &mut warnings)?;
-    let cameras = cameras::read(&document, &nodes, options.camera.as_ref(), &triangles, &mut warnings)?;
-    let lights = lights::read(&document, &nodes)?;
+    /// The scene in the pose that `options` name.
+    ///
+    /// # Errors
+    ///
+    /// As [`load`].
+    pub fn pose(&mut self, options: &LoadOptions) -> Result<Loaded> {
+        if !options.time.is_finite() {
+            let what = format!("{} is not a time; give seconds, such as 1.5s", options.time);
+            return Err(Error::parameter("--time", what));
+        }
+        let document = &self.document;
+        let mut warnings = self.warnings.clone();
+        let pose = animation::Pose::new(document, &options.clip, options.time)?;
+        let nodes = nodes::Nodes::new(document, &pose, options.scene.as_ref())?;
 
-    let mut scene = Scene { triangles, materials, textures, lights, cameras };
-    lights::ensure_light(&document, &mut scene, &used_materials, options.viewer_light, &mut warnings)?;
-    Ok(Loaded { scene, warnings })
+        let (triangles, used) = meshes::triangles(document, &nodes, &pose, &mut warnings)?;
+        let decoded = match self.decoded.take().filter(|decoded| decoded.used == used) {
+            Some(decoded) => decoded,
+            None => {
+                let mut warnings = Vec::new();
+                let (materials, textures) = materials::read(document, &used, &mut warnings)?;
+                Decoded { used, materials, textures, warnings }
+            }
+        };
+        warnings.extend(decoded.warnings.iter().cloned());
+        let (materials, textures) = (decoded.materials.clone(), decoded.textures.clone());
+        let framed = options.framed.map(|(low, high)| corners_of_box(low, high));
+        let cameras = cameras::read(document, &nodes, options.camera.as_ref(), &triangles, framed, &mut warnings)?;
+        let lights = lights::read(document, &nodes)?;
+
+        let mut scene = Scene { triangles, materials, textures, lights, cameras };
+        let (used, wanted) = (&decoded.used, options.viewer_light);
+        lights::ensure_light(document, &mut scene, used, (wanted, options.framed), &mut warnings)?;
+        self.decoded = Some(decoded);
+        Ok(Loaded { scene, warnings })
+    }
+
+    /// First and last key time of a clip [s]; `None` where the file has no animation, or the rest pose is asked for.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] for a clip that the file does not have; [`Error::Input`] for key times that do not increase.
+    pub fn clip_times(&self, clip: &Clip) -> Result<Option<[f64; 2]>> {
+        animation::times(&self.document, clip)
+    }
+
+    /// Whether it has a camera of its own in any scene.
+    pub fn has_camera(&self) -> bool {
+        self.document.root.nodes.iter().any(|node| node.camera.is_some())
+    }
+
+    /// The files that it is read from: itself, and buffers and images beside it.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let root = &self.document.root;
+        let buffers = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
+        let images = root.images.iter().filter_map(|image| image.uri.as_deref());
+        let beside = buffers.chain(images).filter_map(|uri| resources::path_of(&self.document.path, uri).ok());
+        std::iter::once(self.document.path.clone()).chain(beside).collect()
+    }
+}
+
+/// The eight corners of a box.
+fn corners_of_box(low: DVec3, high: DVec3) -> [DVec3; 8] {
+    let side = |bit: usize, low: f64, high: f64| if bit == 0 { low } else { high };
+    std::array::from_fn(|i| {
+        DVec3::new(side(i & 1, low.x, high.x), side(i & 2, low.y, high.y), side(i & 4, low.z, high.z))
+    })
 }

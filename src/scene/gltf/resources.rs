@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Largest file that is read, scene, buffer or image [bytes].
 pub const MAX_FILE_BYTES: u64 = 2 << 30;
@@ -24,14 +24,19 @@ pub(super) fn read_uri(scene: &Path, uri: &str, limit: u64) -> Result<Vec<u8>, S
     if let Some(data) = uri.strip_prefix("data:") {
         return decode_data_uri(data);
     }
+    let path = path_of(scene, uri)?;
+    read_file(&path, limit).map_err(|why| format!("{}: {why}", path.display()))
+}
+
+/// The file that `uri`, which is no data URI, points to.
+pub(super) fn path_of(scene: &Path, uri: &str) -> Result<PathBuf, String> {
     let scheme = uri.split(['/', '?', '#']).next().is_some_and(|first| first.contains(':'));
     if scheme || uri.starts_with(['/', '\\']) {
         return Err(format!("'{uri}' is not a path relative to the scene; put the file beside it and name that"));
     }
     let relative = String::from_utf8(percent_decoded(uri).into_owned())
         .map_err(|_| format!("'{uri}' is not UTF-8 after its %-signs are decoded"))?;
-    let path = scene.parent().unwrap_or(Path::new("")).join(&relative);
-    read_file(&path, limit).map_err(|why| format!("{}: {why}", path.display()))
+    Ok(scene.parent().unwrap_or(Path::new("")).join(&relative))
 }
 
 /// Content of a data URI (RFC 2397) after its `data:`.

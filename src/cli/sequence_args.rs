@@ -1,0 +1,70 @@
+//! Flags of frames in time.
+
+use super::args::size;
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// How frames in time are read and played.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Frames in time")]
+pub(crate) struct SequenceArgs {
+    /// Frames per second [default: one at each refresh of the monitor; of an animated scene 12]. A scene is animated where
+    /// this, --from, --to or --loop is given.
+    #[arg(long, value_name = "RATE")]
+    pub(crate) fps: Option<f64>,
+    /// Begin again after the last frame, until Esc.
+    #[arg(long = "loop")]
+    pub(crate) repeat: bool,
+    /// Animated scene: first time in the clip, in seconds [default: its first key].
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
+    pub(crate) from: Option<f64>,
+    /// Animated scene: the time before which it ends, in seconds [default: its last key].
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
+    pub(crate) to: Option<f64>,
+    /// Frames that are made ahead of the one on the panel; `all` makes every one before the first is shown.
+    #[arg(long, default_value = "4", value_parser = ahead, value_name = "N|all")]
+    pub(crate) ahead: Ahead,
+    /// The input is raw video: bare frames of this size, one after another.
+    #[arg(long, value_parser = size, value_name = "WxH")]
+    pub(crate) raw: Option<(usize, usize)>,
+    /// Pixels of raw video.
+    #[arg(long, value_enum, default_value_t = RawFormatArg::Gray, requires = "raw")]
+    pub(crate) raw_format: RawFormatArg,
+    /// Plane that the contact sheet of the simulated panel is focused on, from the panel, signed as reconstruct's --distance
+    /// [default: the nearest object of a scene, the middle of the content's depth of prepared frames].
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) focus: Option<String>,
+    /// Write a line of JSON for each frame to this file (a pipe will do) as soon as the panel has settled on it.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) events: Option<PathBuf>,
+}
+
+/// How many frames are made ahead.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ahead {
+    Frames(usize),
+    All,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RawFormatArg {
+    /// A byte: the drive level.
+    Gray,
+    /// Two bytes, the low one first: the drive level.
+    Gray16,
+    /// A bit, the first of eight in the high one: on or off.
+    Mono,
+    /// Red, green and blue: the video signal as it is.
+    Rgb,
+}
+
+fn ahead(text: &str) -> Result<Ahead, String> {
+    match text {
+        "all" => Ok(Ahead::All),
+        // Frames of a 4K panel take 25 MB each.
+        number => match number.parse() {
+            Ok(count) if (1..=1000).contains(&count) => Ok(Ahead::Frames(count)),
+            _ => Err(format!("`{text}` is not a number of frames from 1 to 1000, nor all")),
+        },
+    }
+}

@@ -1,0 +1,187 @@
+//! What an eye sees of the newest hologram, reconstructed on a thread of its own.
+
+use super::worker::{Detail, Refined};
+use crate::error::{Error, Result};
+use crate::field::Field;
+use crate::panel::Frame;
+use crate::panel::simulated::Simulation;
+use crate::pipeline;
+use crate::points::placement::Placing;
+use crate::progress::Progress;
+use crate::reconstruction::{self, Picture, View, ViewSettings};
+use std::sync::mpsc::{Receiver, Sender, TryRecvError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+/// From where and at what depth the operator looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Depth in focus, z [m].
+    pub focus: f64,
+    /// The eye beside the viewer's place, x and y [m]; `None`: the whole panel's light on the plane in focus.
+    pub eye: Option<[f64; 2]>,
+    /// Diameter of the eye's pupil [m].
+    pub pupil: f64,
+    /// Angle about the axis that a stop for the zero order blocks [rad].
+    pub zero_order_stop: f64,
+}
+
+impl Look {
+    /// The view that it is of a hologram placed so.
+    pub fn view(&self, placing: &Placing) -> View {
+        match self.eye {
+            None => View::Plane { z: self.focus },
+            Some([x, y]) => {
+                let [own_x, own_y, z] = placing.eye.to_array();
+                View::Eye { position: [own_x + x, own_y + y, z], pupil: self.pupil, focus: self.focus }
+            }
+        }
+    }
+}
+
+/// A picture of a hologram.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// Number of the wish.
+    pub version: u64,
+    /// How fine the hologram is.
+    pub detail: Detail,
+    /// From where it is seen.
+    pub look: Look,
+    /// Linear light.
+    pub picture: Picture,
+    /// Time that it took [s].
+    pub seconds: f64,
+}
+
+/// The picture of a frame on the simulated panel.
+///
+/// # Errors
+/// As [`pipeline::simulated_light`] and [`reconstruction::picture`].
+pub fn reconstruct(
+    frame: &Frame,
+    placing: &Placing,
+    look: &Look,
+    size: (usize, usize),
+    progress: &Progress,
+) -> Result<Picture> {
+    let behind = pipeline::simulated_light(frame, &Simulation::default(), progress)?;
+    of_light(&behind, placing, look, size, progress)
+}
+
+fn of_light(
+    (field, settings): &(Field, ViewSettings),
+    placing: &Placing,
+    look: &Look,
+    size: (usize, usize),
+    progress: &Progress,
+) -> Result<Picture> {
+    let mut settings = *settings;
+    settings.block_zero_order(look.zero_order_stop, field.wavelength);
+    let half = placing.view_at(look.focus);
+    reconstruction::picture(field, &look.view(placing), half, size, &settings, progress)
+}
+
+struct Order {
+    wanted: Option<(Arc<Refined>, Look)>,
+    end: bool,
+    running: Arc<Progress>,
+}
+
+type Orders = Arc<(Mutex<Order>, Condvar)>;
+
+/// Reconstructs what was last asked for; ends when it is dropped.
+pub struct Viewer {
+    orders: Orders,
+    seen: Receiver<Result<Seen>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Viewer {
+    /// A viewer whose pictures have this size (columns, rows) [px].
+    pub fn start(size: (usize, usize)) -> Self {
+        let (tell, seen) = std::sync::mpsc::channel();
+        let order = Order { wanted: None, end: false, running: Arc::default() };
+        let orders: Orders = Arc::new((Mutex::new(order), Condvar::new()));
+        let shared = Arc::clone(&orders);
+        let thread = std::thread::spawn(move || work(&shared, size, &tell));
+        Self { orders, seen, thread: Some(thread) }
+    }
+
+    /// Asks for a picture of this hologram; one that is being made is given up.
+    pub fn ask(&self, hologram: &Arc<Refined>, look: Look) {
+        let (lock, changed) = &*self.orders;
+        let mut order = held(lock);
+        order.wanted = Some((Arc::clone(hologram), look));
+        order.running.stop();
+        changed.notify_all();
+    }
+
+    /// A picture, or what was wrong, since the last call.
+    ///
+    /// # Errors
+    /// Those of [`reconstruct`].
+    pub fn poll(&self) -> Result<Option<Seen>> {
+        match self.seen.try_recv() {
+            Ok(seen) => seen.map(Some),
+            Err(TryRecvError::Empty) => Ok(None),
+            Err(TryRecvError::Disconnected) => Err(Error::unsupported("the reconstruction has ended unexpectedly")),
+        }
+    }
+}
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        {
+            let (lock, changed) = &*self.orders;
+            let mut order = held(lock);
+            order.end = true;
+            order.running.stop();
+            changed.notify_all();
+        }
+        if let Some(thread) = self.thread.take() {
+            // One that has panicked has said so.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn held(lock: &Mutex<Order>) -> MutexGuard<'_, Order> {
+    lock.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn work((lock, changed): &(Mutex<Order>, Condvar), size: (usize, usize), tell: &Sender<Result<Seen>>) {
+    // The light of one hologram serves all looks at it.
+    let mut light: Option<((u64, Detail), (Field, ViewSettings))> = None;
+    loop {
+        let (hologram, look, running) = {
+            let mut order = held(lock);
+            loop {
+                if order.end {
+                    return;
+                }
+                if let Some((hologram, look)) = order.wanted.take() {
+                    order.running = Arc::default();
+                    break (hologram, look, Arc::clone(&order.running));
+                }
+                order = changed.wait(order).unwrap_or_else(PoisonError::into_inner);
+            }
+        };
+        let begin = Instant::now();
+        let known = (hologram.version, hologram.detail);
+        let made = (|| {
+            if light.as_ref().is_none_or(|(of, _)| *of != known) {
+                light = Some((known, pipeline::simulated_light(&hologram.frame, &Simulation::default(), &running)?));
+            }
+            let Some((_, light)) = &light else { return Err(Error::Interrupted) };
+            let picture = of_light(light, &hologram.lit.view.placing, &look, size, &running)?;
+            running.check()?;
+            let seconds = begin.elapsed().as_secs_f64();
+            Ok(Seen { version: hologram.version, detail: hologram.detail, look, picture, seconds })
+        })();
+        if !matches!(made, Err(Error::Interrupted)) && tell.send(made).is_err() {
+            return;
+        }
+    }
+}

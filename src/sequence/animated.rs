@@ -1,0 +1,271 @@
+//! An animated scene, frame by frame.
+//!
+//! What stands still in the scene must stand still before the panel. So three things are the same for all frames: the box
+//! that a camera frames which the file lacks (and that a miniature is fitted by), the camera distances that stand at the
+//! window's nearest and farthest depth, and what is white. They are found by a first look at some of the poses
+//! ([`Animation::first_look`]). The file is read once, its textures are decoded once, and the light on surfaces is
+//! computed again only where a surface or a lamp has moved; where nothing has, the frame before is handed on.
+
+use crate::encode::{EncodeSettings, Encoded};
+use crate::error::{Error, Result};
+use crate::field::Grid;
+use crate::hologram::{self, Computed, HologramSettings};
+use crate::illumination::{Illumination, IlluminationSettings};
+use crate::panel::PanelProfile;
+use crate::pipeline::{self, Lit, SceneSettings};
+use crate::points::Channel;
+use crate::points::exposure::{Exposure, white_level};
+use crate::points::trace::{self, TraceSettings};
+use crate::progress::Progress;
+use crate::scene::{Camera, Scene, SceneBvh, gltf};
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Most frames of one animation.
+pub const MAX_FRAMES: usize = 100_000;
+/// Poses that the first look takes, evenly over the frames.
+const LOOKS: usize = 16;
+/// Rays along the longer side of the first look.
+const LOOK_RAYS: f64 = 64.0;
+/// What the depths of poses between those looked at may lie outside: this part of the range on either side.
+const DEPTH_MARGIN: f64 = 0.02;
+
+/// Which poses become frames, and how.
+#[derive(Clone, Debug)]
+pub struct Animation {
+    /// The scene file.
+    pub path: PathBuf,
+    /// How each pose becomes points; its time and what it holds still are set here.
+    pub scene: SceneSettings,
+    /// Time of each frame in the clip [s].
+    pub times: Vec<f64>,
+}
+
+/// One frame of an animation.
+#[derive(Clone, Debug)]
+pub struct Made {
+    /// Running number, from 0.
+    pub number: usize,
+    /// Its time in the clip [s].
+    pub time: f64,
+    /// Points and picture.
+    pub lit: Arc<Lit>,
+    /// What the field took.
+    pub field: hologram::HologramReport,
+    /// Levels for the panel.
+    pub encoded: Arc<Encoded>,
+    /// Whether nothing had moved since the frame before, which this one is again.
+    pub still: bool,
+    /// Whether the light on surfaces of the frame before could be kept.
+    pub light_kept: bool,
+    /// Time that it took [s].
+    pub seconds: f64,
+}
+
+impl Animation {
+    /// Frames at `rate` [Hz] from `from` to `to` [s], the clip's own first and last key where they are not given. The last
+    /// time itself has no frame: played in a loop it is the first one again.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a file without animation, a rate that is not positive, an interval without extent, or more
+    /// than [`MAX_FRAMES`]; as [`gltf::File::open`].
+    pub fn new(path: &Path, scene: &SceneSettings, rate: f64, from: Option<f64>, to: Option<f64>) -> Result<Self> {
+        let file = gltf::File::open(path)?;
+        let Some([first, last]) = file.clip_times(&scene.load.clip)? else {
+            return Err(Error::input(
+                path,
+                "has no animation; without --fps, --from and --to it is shown as it stands",
+            ));
+        };
+        let (from, to) = (from.unwrap_or(first), to.unwrap_or(last));
+        if !(rate.is_finite() && rate > 0.0) {
+            return Err(Error::parameter("fps", format!("{rate} frames per second; give a number above zero")));
+        }
+        if !(from.is_finite() && to.is_finite() && from < to) {
+            return Err(Error::parameter("from/to", format!("{from} s to {to} s has no extent")));
+        }
+        // A whole number of frames may come out a rounding above itself.
+        let count = ((to - from) * rate - 1e-6).ceil().max(1.0);
+        if count > MAX_FRAMES as f64 {
+            return Err(Error::parameter("fps", format!("{count} frames; at most {MAX_FRAMES}")));
+        }
+        let times = (0..count as usize).map(|n| from + n as f64 / rate).collect();
+        Ok(Self { path: path.to_path_buf(), scene: scene.clone(), times })
+    }
+
+    /// Looks at some of the poses and fixes what all frames have in common.
+    ///
+    /// # Errors
+    /// As [`pipeline::light`].
+    pub fn first_look(&mut self, panel: &Grid, progress: &Progress) -> Result<()> {
+        let step = self.times.len().div_ceil(LOOKS).max(1);
+        let mut times: Vec<f64> = self.times.iter().copied().step_by(step).collect();
+        times.extend(self.times.last());
+        progress.start("first look", 2 * times.len() as u64);
+        let mut file = gltf::File::open(&self.path)?;
+        let mut bounds: Option<(DVec3, DVec3)> = None;
+        for &time in &times {
+            progress.check()?;
+            let own = self.pose(&mut file, time)?.scene.bounds();
+            bounds = match (bounds, own) {
+                (Some((low, high)), Some((l, h))) => Some((low.min(l), high.max(h))),
+                (known, own) => known.or(own),
+            };
+            progress.advance(1);
+        }
+        self.scene.held.bounds = bounds;
+        self.scene.load.framed = bounds;
+        let (mut depths, mut white) = ([f64::INFINITY, f64::NEG_INFINITY], 0.0f32);
+        for &time in &times {
+            let loaded = self.pose(&mut file, time)?;
+            let (seen, level) = self.glance(&loaded, panel, &progress.part())?;
+            depths = [depths[0].min(seen[0]), depths[1].max(seen[1])];
+            white = white.max(level);
+            progress.check()?;
+            progress.advance(1);
+        }
+        if depths[0] <= depths[1] {
+            let margin = DEPTH_MARGIN * (depths[1] - depths[0]);
+            self.scene.held.depths = Some([(depths[0] - margin).max(0.5 * depths[0]), depths[1] + margin]);
+        }
+        if self.scene.exposure == Exposure::Auto && white > 0.0 {
+            self.scene.exposure = Exposure::White(white);
+        }
+        Ok(())
+    }
+
+    fn pose(&self, file: &mut gltf::File, time: f64) -> Result<gltf::Loaded> {
+        file.pose(&gltf::LoadOptions { time, ..self.scene.load.clone() })
+    }
+
+    /// Camera distances of the nearest and farthest point [m] and the level of white, by few rays and coarse light.
+    fn glance(&self, loaded: &gltf::Loaded, panel: &Grid, progress: &Progress) -> Result<([f64; 2], f32)> {
+        let settings = &self.scene;
+        let camera = first_camera(&self.path, &loaded.scene)?;
+        let bvh = SceneBvh::new(&loaded.scene);
+        let coarse = IlluminationSettings {
+            residual: 1e-2,
+            indirect_rays: 32,
+            photons: 0,
+            final_gather: None,
+            longest_element: 0.2,
+            shortest_element: 0.1,
+            ..settings.illumination
+        };
+        let light = Illumination::new(&bvh, coarse, progress)?;
+        let (width, height) = (f64::from(settings.trace.width), f64::from(settings.trace.height));
+        let scale = (LOOK_RAYS / width.max(height)).min(1.0);
+        let [w, h] = [width, height].map(|side| (side * scale).round().max(1.0) as u32);
+        let rays = TraceSettings { width: w, height: h, edge_rays: 1, ..settings.trace };
+        // Where a miniature is seen from is the placement's matter.
+        let placing = settings.placement.prepare_for(&loaded.scene, &settings.held, camera, width / height, panel)?;
+        let traced = trace::trace(&light, &placing.camera, &rays, progress)?;
+        let camera_from_world = placing.camera.world_from_camera.inverse();
+        let ends = traced
+            .points
+            .iter()
+            .map(|point| -camera_from_world.transform_point3(point.position).z)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[near, far], w| [near.min(w), far.max(w)]);
+        Ok((ends, white_level(&traced.picture)))
+    }
+
+    /// Makes the frames in order and hands each to `take`, until that returns false.
+    ///
+    /// # Errors
+    /// As the steps of [`pipeline`]; those of `take`.
+    pub fn make(
+        &self,
+        (profile, wavelength, channel): (&PanelProfile, f64, Channel),
+        hologram: &HologramSettings,
+        encode: &EncodeSettings,
+        progress: &Progress,
+        take: &mut dyn FnMut(Made) -> Result<bool>,
+    ) -> Result<()> {
+        let grid = profile.grid()?;
+        let mut file = gltf::File::open(&self.path)?;
+        let mut number = 0;
+        let mut pending: Option<gltf::Loaded> = None;
+        while let Some(&time) = self.times.get(number) {
+            let mut begin = Instant::now();
+            progress.start("scene", 0);
+            let loaded = match pending.take() {
+                Some(loaded) => loaded,
+                None => self.pose(&mut file, time)?,
+            };
+            let bvh = SceneBvh::new(&loaded.scene);
+            let light = Illumination::new(&bvh, self.scene.illumination, progress)?;
+            let mut camera = first_camera(&self.path, &loaded.scene)?.clone();
+            let mut last: Option<Made> = None;
+            // All frames for which this light holds.
+            while let Some(&time) = self.times.get(number) {
+                if last.is_some() {
+                    begin = Instant::now();
+                    let next = self.pose(&mut file, time)?;
+                    if !same_light(&next.scene, &loaded.scene) {
+                        pending = Some(next);
+                        break;
+                    }
+                    let seen_from = first_camera(&self.path, &next.scene)?;
+                    if *seen_from == camera
+                        && let Some(made) = &last
+                    {
+                        let again = Made { number, time, still: true, light_kept: true, ..made.clone() };
+                        let again = Made { seconds: begin.elapsed().as_secs_f64(), ..again };
+                        number += 1;
+                        if !take(again)? {
+                            return Ok(());
+                        }
+                        continue;
+                    }
+                    camera = seen_from.clone();
+                }
+                let (at, settings) = ((&grid, wavelength), &self.scene);
+                let lit = pipeline::seen(&self.path, (&loaded, &camera), &light, settings, at, progress)?;
+                let Computed { field, report } =
+                    pipeline::field(&lit.placed.cloud, channel, &grid, wavelength, hologram, progress)?;
+                let mut encoded = pipeline::frame(&field, profile, encode, progress)?;
+                let origin = &mut encoded.frame.metadata.origin;
+                origin.source = Some(self.path.display().to_string());
+                origin.points = Some(lit.placed.cloud.points.len());
+                origin.depth = lit.placed.cloud.depth_range().map(|(far, near)| [near, far]);
+                origin.notes = vec![format!("frame {number} of {}, at {time:.6} s", self.times.len())];
+                let made = Made {
+                    number,
+                    time,
+                    lit: Arc::new(lit),
+                    field: report,
+                    encoded: Arc::new(encoded),
+                    still: false,
+                    light_kept: last.is_some(),
+                    seconds: begin.elapsed().as_secs_f64(),
+                };
+                last = Some(made.clone());
+                number += 1;
+                if !take(made)? {
+                    return Ok(());
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn first_camera<'a>(path: &Path, scene: &'a Scene) -> Result<&'a Camera> {
+    scene.cameras.first().ok_or_else(|| Error::input(path, "has no camera"))
+}
+
+/// Whether the light on the surfaces of two poses of one file is the same: the same triangles in the same light.
+fn same_light(a: &Scene, b: &Scene) -> bool {
+    // Materials of one file are those of its triangles in the order of first use.
+    a.triangles.len() == b.triangles.len()
+        && a.materials == b.materials
+        && a.triangles.iter().zip(&b.triangles).all(|(a, b)| {
+            a.positions == b.positions && a.normals == b.normals && a.colors == b.colors && a.material == b.material
+        })
+        && a.lights.len() == b.lights.len()
+        && a.lights.iter().zip(&b.lights).all(|(a, b)| {
+            a.kind == b.kind && a.position == b.position && a.direction == b.direction && a.intensity == b.intensity
+        })
+}
