@@ -50,6 +50,24 @@ pub(crate) fn tilt(sources: &[Source], grid: &Grid, limit: [f64; 2]) -> f64 {
     (parts.iter().sum::<f64>() / sources.len().max(1) as f64).sqrt()
 }
 
+/// The largest wave at its strongest, amplitude/distance, against the root mean square of all over the pixels that they
+/// light: what errors that go with the largest of a group do to the whole. Infinite where nothing is lit.
+pub(crate) fn contrast(sources: &[Source], grid: &Grid, limit: [f64; 2]) -> f64 {
+    let one = |s: &Source| {
+        // Pixels in units that do not matter, times the light on each.
+        let lit: f64 = s.sines(grid, limit).map(|[low, high]| high - low).iter().product();
+        let strongest = s.amplitude.abs() / s.distance;
+        [lit * s.amplitude * s.amplitude, lit * s.distance * s.distance, strongest]
+    };
+    let add = |a: [f64; 3], b: [f64; 3]| [a[0] + b[0], a[1] + b[1], a[2].max(b[2])];
+    let parts: Vec<[f64; 3]> =
+        sources.par_chunks(PART).map(|part| part.iter().map(one).fold([0.0; 3], add)).collect();
+    let [light, pixels, strongest] = parts.into_iter().fold([0.0; 3], add);
+    // On a slope the wave is weaker than on the axis, by the cosine.
+    let cosine = (1.0 - limit.map(|sine| sine * sine).iter().sum::<f64>()).max(0.01).sqrt();
+    if light > 0.0 { strongest / ((light / pixels).sqrt() * cosine) } else { f64::INFINITY }
+}
+
 /// Sources that one task sums over: fixed, so that sums do not depend on the number of threads.
 const PART: usize = 4096;
 
