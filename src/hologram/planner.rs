@@ -10,8 +10,8 @@ use super::exact::GPU_ROUNDING;
 use super::exact::{DIRECT_ERROR, Division};
 use super::planes::{Cloud, Parameters};
 use super::sources::{Coverage, Source, sources};
-use super::{Cull, HologramSettings, InstructionSet, Method, Plan};
 use super::tiles::{Kernel, Products, Shape};
+use super::{Cull, HologramSettings, InstructionSet, Method, Plan};
 #[cfg(feature = "gpu")]
 use super::{gpu, tiles::Class};
 use super::{near, oracle, recurrence};
@@ -215,7 +215,8 @@ const FIELD_PIXEL: f64 = 8e-9;
 /// Slowness against AVX-512, measured.
 fn set_factor(settings: &HologramSettings, method: Method) -> f64 {
     match (settings.instruction_set.unwrap_or_else(InstructionSet::detect), method) {
-        (InstructionSet::Avx512Vnni | InstructionSet::Avx512, _) | (_, Method::Oracle | Method::Gpu | Method::GpuPlanes) => 1.0,
+        (InstructionSet::Avx512Vnni | InstructionSet::Avx512, _)
+        | (_, Method::Oracle | Method::Gpu | Method::GpuPlanes) => 1.0,
         (InstructionSet::Avx2, _) => 1.3,
         (InstructionSet::Portable, Method::Direct | Method::Recurrence) => 5.5,
         (InstructionSet::Portable, Method::Tiles) => 9.5,

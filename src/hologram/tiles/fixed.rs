@@ -18,23 +18,10 @@ pub(super) const FULL: f64 = 5_810.0;
 /// What an amplitude of 1 in units of the batch's largest becomes.
 pub(super) const UNIT: f64 = TABLE * FULL / 32_768.0;
 
-/// Root mean square of a factor's rounding, in units of the batch's largest amplitude. Parts, in units of the last
-/// place: 0.41 the parts' own, 0.41 the multiplier's and its slope's, 0.16 the phase's, 0.2 inside the sine.
-pub(super) const NOISE: f64 = 0.65 / UNIT;
-
 const fn table(from: usize) -> [i16; 32] {
     // One eighth of the circle, cos(2πi/32), in units of 1e-9; the rest by symmetry.
-    const FIRST: [i64; 9] = [
-        1_000_000_000,
-        980_785_280,
-        923_879_533,
-        831_469_612,
-        707_106_781,
-        555_570_233,
-        382_683_432,
-        195_090_322,
-        0,
-    ];
+    const FIRST: [i64; 9] =
+        [1_000_000_000, 980_785_280, 923_879_533, 831_469_612, 707_106_781, 555_570_233, 382_683_432, 195_090_322, 0];
     let mut values = [0i16; 32];
     let mut i = 0;
     while i < 32 {
@@ -89,6 +76,17 @@ pub(super) fn pair(a: __m512i, b: __m512i) -> __m512i {
 #[derive(Clone, Copy)]
 pub(super) struct Wave(pub(super) [f32; 4]);
 
+impl Wave {
+    /// The phase at indexes `u`, in 2⁻¹⁶ turn.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512bw")]
+    fn phase(&self, u: __m512) -> __m512i {
+        let power = |n: usize| _mm512_set1_ps(self.0[n]);
+        let sum = _mm512_fmadd_ps(_mm512_fmadd_ps(power(3), u, power(2)), u, power(1));
+        _mm512_cvtps_epi32(_mm512_fmadd_ps(sum, u, power(0)))
+    }
+}
+
 /// Multiplier of a point's cosines in 2⁻¹⁵, and what it changes by in 128 indexes times 2.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Strength {
@@ -135,12 +133,7 @@ impl Indexes {
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
 pub(super) fn evaluate(waves: [Wave; 2], strengths: [Strength; 2], at: Indexes) -> [__m512i; 3] {
-    let [a, b] = waves.map(|Wave(w)| {
-        let [base, first, second, third] = w.map(|x| _mm512_set1_ps(x));
-        let sum = _mm512_fmadd_ps(_mm512_fmadd_ps(third, at.u, second), at.u, first);
-        _mm512_cvtps_epi32(_mm512_fmadd_ps(sum, at.u, base))
-    });
-    let (c, s) = cos_sin(pair(a, b));
+    let (c, s) = cos_sin(pair(waves[0].phase(at.u), waves[1].phase(at.u)));
     let both = |low: i16, high: i16| _mm512_set1_epi32(i32::from(high) << 16 | i32::from(low as u16));
     let [low, high] = strengths;
     // value·slope·u: the upper half of (256·value·slope)·(128·u).
@@ -148,4 +141,50 @@ pub(super) fn evaluate(waves: [Wave; 2], strengths: [Strength; 2], at: Indexes) 
     let strength = _mm512_add_epi16(both(low.value, high.value), change);
     let (re, im) = (_mm512_mulhrs_epi16(c, strength), _mm512_mulhrs_epi16(s, strength));
     [re, im, _mm512_add_epi16(re, im)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hologram::InstructionSet;
+    use std::f64::consts::TAU;
+
+    #[target_feature(enable = "avx512f,avx512bw")]
+    fn whole_circle() -> Vec<[i16; 2]> {
+        let mut found = Vec::new();
+        for first in (0..1 << 16).step_by(32) {
+            let phases: [i16; 32] = std::array::from_fn(|i| (first + i as i32) as u16 as i16);
+            let mut parts = [[0i16; 32]; 2];
+            // SAFETY: thirty-two values each.
+            unsafe {
+                let (c, s) = cos_sin(_mm512_loadu_epi16(phases.as_ptr()));
+                _mm512_storeu_epi16(parts[0].as_mut_ptr(), c);
+                _mm512_storeu_epi16(parts[1].as_mut_ptr(), s);
+            }
+            found.extend((0..32).map(|i| [parts[0][i], parts[1][i]]));
+        }
+        found
+    }
+
+    #[test]
+    fn every_phase_has_its_cosine_and_sine_and_none_is_longer_than_stated() {
+        if !InstructionSet::available().contains(&InstructionSet::Avx512Vnni) {
+            return println!("not run: this machine has no AVX-512 VNNI");
+        }
+        // SAFETY: the set was detected.
+        let found = unsafe { whole_circle() };
+        assert_eq!(found.len(), 1 << 16);
+        let (mut worst, mut longest, mut squares) = (0.0f64, 0.0f64, 0.0);
+        for (phase, [c, s]) in found.into_iter().enumerate() {
+            let (sin, cos) = (phase as f64 / 65_536.0 * TAU).sin_cos();
+            let error = (f64::from(c) - TABLE * cos).hypot(f64::from(s) - TABLE * sin);
+            (worst, squares) = (worst.max(error), squares + error * error);
+            longest = longest.max(f64::from(c).hypot(f64::from(s)));
+        }
+        let mean = (squares / 65_536.0).sqrt();
+        println!("largest error {worst:.2}, mean {mean:.2}, largest modulus {longest:.1}");
+        // 4e-5 of the linear sine is 1.3; five roundings of at most one half, or a truncation, are the rest.
+        assert!(worst < 4.0 && mean < 1.5, "{worst} {mean}");
+        assert!(longest <= LONGEST, "{longest}");
+    }
 }

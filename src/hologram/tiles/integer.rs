@@ -2,13 +2,15 @@
 //!
 //! `vpdpwssd` multiplies and adds twice as many 16-bit numbers as an FMA does f32, and a complex product takes three real
 //! ones: re = P₁ − P₂, im = P₃ − P₁ − P₂ with P₁ = Σ x_r·y_r, P₂ = Σ x_i·y_i, P₃ = Σ (x_r + x_i)(y_r + y_i). Integer sums
-//! are exact, so nothing is lost in the differences; what is lost is the rounding of the factors ([`NOISE`]).
+//! are exact, so nothing is lost in the differences; what is lost is the rounding of the factors
+//! ([`INTEGER_NOISE`](super::shape::INTEGER_NOISE)).
 //!
 //! Sums do not overflow: they are taken modulo 2³², where P₁, P₂ and P₃ may wrap, but |re|, |im| ≤ Σ|x||y| ≤
 //! [`BATCH`]·[`LARGEST`]² < 2³¹, so what the differences leave modulo 2³² is the value itself.
 
 use super::fixed::{FULL, Indexes, LONGEST, Strength, UNIT, Wave, evaluate, pair};
 use super::kernel::{self, BATCH, COLUMNS, Factor, Job, Limit, Panels, ROWS, Relative, factor, stride};
+use super::shape::OVERSHOOT;
 use crate::hologram::lanes::Avx512;
 use std::arch::x86_64::*;
 
@@ -25,9 +27,6 @@ const LARGEST: i64 = {
 
 // |re|, |im| of a batch's sums fit 32 bits; a part's and a sum of parts' fit 16.
 const _: () = assert!(BATCH as i64 * LARGEST * LARGEST < 1 << 31 && 2 * LARGEST < 1 << 15);
-
-/// Bound on |T| of the taper: the edge's overshoot at any distance.
-pub(super) const OVERSHOOT: f64 = 1.18;
 
 /// Points of a batch by quantity and axis, padded with dark ones.
 struct Batch {
@@ -184,38 +183,45 @@ unsafe fn fill(
 ) {
     let inverse = 1.0 / unit;
     let amplitude = |k: usize| inverse * if axis == 0 { batch.amplitude[k] } else { 1.0 };
+    let wave = |k: usize| {
+        let [base, first, second, third] = &batch.waves[axis];
+        Wave([base[k], first[k], second[k], third[k]])
+    };
+    let strength = |k: usize| Strength::of(amplitude(k), batch.slope[axis][k]);
+    let tapered = |k: usize| {
+        let p = points.get(k)?;
+        let offset = if axis == 0 { p.dx } else { p.dy };
+        let mut found = factor(job, &job.axes[axis], p, offset, batch.inverse[k], half);
+        found.base = if axis == 0 { batch.turns[k] } else { 0.0 };
+        found.amplitude = (amplitude(k) * UNIT) as f32;
+        Some(found)
+    };
     let start = Indexes::from(-half as f32);
     for number in 0..points.len().div_ceil(2) {
-        let both = [2 * number, 2 * number + 1];
-        let waves = both.map(|k| Wave([0, 1, 2, 3].map(|power| batch.waves[axis][power][k])));
-        let strengths = both.map(|k| Strength::of(amplitude(k), batch.slope[axis][k]));
-        let limited = both.iter().any(|&k| batch.edge[axis][k] > 0.0).then(|| {
-            both.map(|k| {
-                let p = points.get(k)?;
-                let offset = if axis == 0 { p.dx } else { p.dy };
-                let mut found = factor(job, &job.axes[axis], p, offset, batch.inverse[k], half);
-                found.base = if axis == 0 { batch.turns[k] } else { 0.0 };
-                found.amplitude = (amplitude(k) * UNIT) as f32;
-                Some(found)
-            })
-        });
+        let [first, second] = [2 * number, 2 * number + 1];
+        let place = |vector: usize| {
+            number * layout.pair + vector / layout.vectors * layout.block + vector % layout.vectors * 16
+        };
         let mut at = start;
-        for vector in 0..vectors {
-            let parts = match &limited {
-                None => evaluate(waves, strengths, at),
-                Some(factors) => {
-                    // SAFETY: this function enables the instruction set.
-                    let [a, b] = factors.map(|factor| unsafe { rounded(factor, at.u) });
+        if batch.edge[axis][first] > 0.0 || batch.edge[axis][second] > 0.0 {
+            let [first, second] = [tapered(first), tapered(second)];
+            for vector in 0..vectors {
+                // SAFETY: this function enables the instruction set; the place is inside the panel, as the caller
+                // asserted.
+                unsafe {
+                    let (a, b) = (rounded(&first, at.u), rounded(&second, at.u));
                     let (re, im) = (pair(a.0, b.0), pair(a.1, b.1));
-                    [re, im, _mm512_add_epi16(re, im)]
+                    put([re, im, _mm512_add_epi16(re, im)], to.add(place(vector)), layout.part);
                 }
-            };
-            let from = number * layout.pair + vector / layout.vectors * layout.block + vector % layout.vectors * 16;
-            for (part, values) in parts.into_iter().enumerate() {
-                // SAFETY: inside the panel, as the caller asserted, at a multiple of sixteen lanes.
-                unsafe { _mm512_storeu_epi32(to.add(from + part * layout.part), values) };
+                at = at.next();
             }
-            at = at.next();
+        } else {
+            let (waves, strengths) = ([wave(first), wave(second)], [strength(first), strength(second)]);
+            for vector in 0..vectors {
+                // SAFETY: as above.
+                unsafe { put(evaluate(waves, strengths, at), to.add(place(vector)), layout.part) };
+                at = at.next();
+            }
         }
     }
 }
@@ -226,14 +232,29 @@ unsafe fn fill(
 /// As [`Lanes`](crate::hologram::lanes::Lanes).
 #[inline]
 #[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl,avx512vnni,avx2,fma")]
-unsafe fn rounded(factor: Option<Factor>, u: __m512) -> (__m512i, __m512i) {
+unsafe fn rounded(factor: &Option<Factor>, u: __m512) -> (__m512i, __m512i) {
     match factor {
         Some(factor) => {
             // SAFETY: the caller's promise.
-            let (re, im) = unsafe { kernel::evaluate(&factor, Avx512(u)) };
+            let (re, im) = unsafe { kernel::evaluate(factor, Avx512(u)) };
             (_mm512_cvtps_epi32(re.0), _mm512_cvtps_epi32(im.0))
         }
         None => (_mm512_setzero_si512(), _mm512_setzero_si512()),
+    }
+}
+
+/// Writes the three parts of sixteen indexes of a pair, `step` lanes apart.
+///
+/// # Safety
+/// Sixteen lanes at each place are writable.
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw")]
+unsafe fn put(parts: [__m512i; 3], to: *mut i32, step: usize) {
+    // SAFETY: the caller's promise.
+    unsafe {
+        _mm512_storeu_epi32(to, parts[0]);
+        _mm512_storeu_epi32(to.add(step), parts[1]);
+        _mm512_storeu_epi32(to.add(2 * step), parts[2]);
     }
 }
 

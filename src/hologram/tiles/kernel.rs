@@ -122,14 +122,7 @@ enum Edge<'a> {
 /// Third-order expansion of the sphere along an axis: `offset` = Δ on it at the tile's centre, `half` its half size in
 /// indexes, `inverse` = 1/r.
 #[inline(always)]
-pub(super) fn factor<'a>(
-    job: &Job<'a>,
-    axis: &Axis,
-    p: &Relative,
-    offset: f64,
-    inverse: f64,
-    half: f64,
-) -> Factor<'a> {
+pub(super) fn factor<'a>(job: &Job<'a>, axis: &Axis, p: &Relative, offset: f64, inverse: f64, half: f64) -> Factor<'a> {
     let step = axis.pitch * inverse;
     let s = offset * inverse;
     let bend = 1.0 - s * s;

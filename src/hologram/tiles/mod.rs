@@ -297,3 +297,6 @@ fn scatter(band: &mut [Complex32], stride: usize, column: usize, width: usize, p
         }
     }
 }
+
+#[cfg(all(test, target_arch = "x86_64"))]
+mod tests;
