@@ -210,7 +210,7 @@ impl Job<'_> {
 }
 
 /// Taking and first touching the memory of a field's pixel [core-seconds].
-const FIELD_PIXEL: f64 = 8e-9;
+const FIELD_PIXEL: f64 = 3.5e-9;
 
 /// Slowness against AVX-512, measured.
 fn set_factor(settings: &HologramSettings, method: Method) -> f64 {

@@ -1,4 +1,4 @@
-//! Vectors of f32 for the inner loops: one source, three instruction sets.
+//! Vectors of f32 for the inner loops: one source, three widths.
 //!
 //! A kernel is written once, generic over [`Lanes`] and inlined into a function that enables the instruction set;
 //! [`InstructionSet::detect`] chooses it at run time. All paths do the same operations in the same order per lane, but

@@ -121,7 +121,7 @@ impl Shape {
         match self.kernel {
             Kernel::Paths => height * (4e-8 + width * 1.4e-9),
             Kernel::Float => 4e-8 + 6e-10 * (width + height) + width * height * 7.5e-11,
-            Kernel::Integer => 2e-8 + 3e-10 * (width + height) + width * height * 3e-11,
+            Kernel::Integer => 2e-8 + 4e-10 * (width + height) + width * height * 3e-11,
         }
     }
 }

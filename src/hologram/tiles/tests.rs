@@ -104,7 +104,7 @@ fn rounding_is_what_is_stated_for_every_count_of_points_and_size_of_tile() {
             }
         }
     }
-    let mean = (squares / tries as f64).sqrt();
+    let mean = (squares / tries).sqrt();
     println!("rounding {mean:.2e}, stated {:.2e} a factor", INTEGER_NOISE);
     assert!(mean > 0.5 * INTEGER_NOISE, "{mean:.2e}: states far too much");
 }
