@@ -120,7 +120,7 @@ impl Shape {
         let (width, height) = (self.width as f64, self.height as f64);
         match self.kernel {
             Kernel::Paths => height * (4e-8 + width * 1.4e-9),
-            Kernel::Float => 4e-8 + 6e-10 * (width + height) + width * height * 7.5e-11,
+            Kernel::Float => 4.3e-8 + 6.5e-10 * (width + height) + width * height * 8e-11,
             Kernel::Integer => 2e-8 + 4e-10 * (width + height) + width * height * 3e-11,
         }
     }
