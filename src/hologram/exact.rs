@@ -4,7 +4,7 @@ use super::definition::Optics;
 #[cfg(feature = "gpu")]
 use super::gpu;
 use super::lanes::InstructionSet;
-use super::tiles::{self, Class};
+use super::tiles::{self, Class, Products};
 use super::{Cull, Source, near, recurrence};
 #[cfg(not(feature = "gpu"))]
 use crate::error::Error;
@@ -47,12 +47,13 @@ pub(crate) struct Division {
 }
 
 impl Division {
-    /// Divides points for a wanted error; incomplete when asked to stop.
+    /// Divides points for a wanted error and the products that the engine has; incomplete when asked to stop.
     pub(crate) fn new(
         optics: &Optics,
         grid: &Grid,
         sources: &[Source],
         cull: Cull,
+        products: Products,
         error: f64,
         progress: &Progress,
     ) -> Self {
@@ -63,7 +64,7 @@ impl Division {
         };
         let flags: Vec<bool> = sources.par_iter().map(is_near).collect();
         let (near, rest): (Vec<usize>, Vec<usize>) = (0..sources.len()).partition(|&i| flags[i]);
-        let far = tiles::classify(optics, grid, sources, &rest, cull, 0.8 * error, progress);
+        let far = tiles::classify(optics, grid, sources, &rest, cull, products, 0.8 * error, progress);
         // The form's error falls with distance.
         let nearest = rest.iter().map(|&i| sources[i].distance).min_by(f64::total_cmp);
         let form = match (cull, nearest) {

@@ -32,6 +32,7 @@ use exact::{Division, GPU_ROUNDING};
 use planner::{Engine, ORACLE_ERROR};
 use sources::{Source, sources};
 use std::time::Instant;
+use tiles::Products;
 
 /// How a field is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -169,18 +170,18 @@ pub fn compute(
     let (field, error_bound) = match plan.engine {
         Engine::Oracle => (oracle::watched(points, grid, wavelength, cull, progress)?.to_f32(), ORACLE_ERROR),
         Engine::Exact { error } => {
-            let division = Division::new(&optics, grid, &sources, cull, error, progress);
+            let division = Division::new(&optics, grid, &sources, cull, Products::of(set), error, progress);
             progress.check()?;
             (division.sum(grid, &optics, &sources, cull, set, progress)?, division.error)
         }
         Engine::Recurrence { error } => {
-            let division = Division::new(&optics, grid, &sources, cull, error, progress);
+            let division = Division::new(&optics, grid, &sources, cull, Products::Float, error, progress);
             progress.check()?;
             let bound = division.blocks(&optics, error).1;
             (division.sum_by_recurrence(grid, &optics, &sources, cull, error, set, progress)?, bound)
         }
         Engine::Gpu { error } => {
-            let division = Division::new(&optics, grid, &sources, cull, error, progress);
+            let division = Division::new(&optics, grid, &sources, cull, Products::Shader, error, progress);
             progress.check()?;
             (division.sum_on_gpu(grid, &optics, &sources, cull, progress)?, division.gpu_error())
         }

@@ -10,6 +10,7 @@ use super::exact::GPU_ROUNDING;
 use super::exact::{DIRECT_ERROR, Division};
 use super::planes::{Cloud, Parameters};
 use super::sources::{Coverage, Source, sources};
+use super::tiles::{Kernel, Products, Shape};
 use super::{Cull, HologramSettings, InstructionSet, Method, Plan};
 #[cfg(feature = "gpu")]
 use super::{gpu, tiles::Class};
@@ -79,13 +80,22 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
+    /// The division for an engine with such products.
+    fn division(&self, products: Products, error: f64) -> Division {
+        let cull = self.settings.cull;
+        Division::new(&self.optics, self.grid, self.sources, cull, products, error, &Progress::new())
+    }
+
     fn exact(&self, method: Method, error: f64) -> Candidate {
-        let division =
-            Division::new(&self.optics, self.grid, self.sources, self.settings.cull, error, &Progress::new());
+        let set = self.settings.instruction_set.unwrap_or_else(InstructionSet::detect);
+        let division = self.division(Products::of(set), error);
         let shape = division.far.iter().max_by_key(|class| class.len()).map(|class| class.shape);
         let words = match shape {
-            Some(shape) if shape.exact => "every pixel from its own path".to_owned(),
-            Some(shape) => format!("tiles of {}×{} px", shape.width, shape.height),
+            Some(Shape { kernel: Kernel::Paths, .. }) => "every pixel from its own path".to_owned(),
+            Some(Shape { kernel: Kernel::Float, width, height, .. }) => format!("tiles of {width}×{height} px"),
+            Some(Shape { kernel: Kernel::Integer, width, height, .. }) => {
+                format!("tiles of {width}×{height} px in 16-bit integers")
+            }
             None => "points near the panel as products of kernels".to_owned(),
         };
         let factor = set_factor(self.settings, method);
@@ -102,7 +112,7 @@ impl Job<'_> {
 
     fn recurrence(&self, error: f64, pairs: f64) -> Candidate {
         let settings = self.settings;
-        let division = Division::new(&self.optics, self.grid, self.sources, settings.cull, error, &Progress::new());
+        let division = self.division(Products::Float, error);
         let (blocks, bound) = division.blocks(&self.optics, error);
         let (shortest, longest) = blocks.iter().fold((256, 32), |(s, l), &b| (s.min(b), l.max(b)));
         let near = near::core_seconds(&self.optics, self.sources, &division.near);
@@ -121,8 +131,7 @@ impl Job<'_> {
     #[cfg(feature = "gpu")]
     fn gpu(&self, error: f64, pairs: f64, threads: f64) -> Result<Candidate> {
         let adapter = gpu::adapter()?;
-        let division =
-            Division::new(&self.optics, self.grid, self.sources, self.settings.cull, error, &Progress::new());
+        let division = self.division(Products::Shader, error);
         let near = near::core_seconds(&self.optics, self.sources, &division.near);
         let far: usize = division.far.iter().map(Class::len).sum();
         let seconds = gpu::seconds(pairs).unwrap_or(pairs / gpu::SOFTWARE_RATE);
@@ -201,12 +210,13 @@ impl Job<'_> {
 }
 
 /// Taking and first touching the memory of a field's pixel [core-seconds].
-const FIELD_PIXEL: f64 = 8e-9;
+const FIELD_PIXEL: f64 = 3.5e-9;
 
 /// Slowness against AVX-512, measured.
 fn set_factor(settings: &HologramSettings, method: Method) -> f64 {
     match (settings.instruction_set.unwrap_or_else(InstructionSet::detect), method) {
-        (InstructionSet::Avx512, _) | (_, Method::Oracle | Method::Gpu | Method::GpuPlanes) => 1.0,
+        (InstructionSet::Avx512Vnni | InstructionSet::Avx512, _)
+        | (_, Method::Oracle | Method::Gpu | Method::GpuPlanes) => 1.0,
         (InstructionSet::Avx2, _) => 1.3,
         (InstructionSet::Portable, Method::Direct | Method::Recurrence) => 5.5,
         (InstructionSet::Portable, Method::Tiles) => 9.5,

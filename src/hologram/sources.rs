@@ -50,6 +50,21 @@ pub(crate) fn tilt(sources: &[Source], grid: &Grid, limit: [f64; 2]) -> f64 {
     (parts.iter().sum::<f64>() / sources.len().max(1) as f64).sqrt()
 }
 
+/// The largest wave on its axis, amplitude/distance, against the root mean square of all over the pixels that they
+/// light: what errors that go with the largest of a group do to the whole. Infinite where nothing is lit.
+pub(crate) fn contrast(sources: &[Source], grid: &Grid, limit: [f64; 2]) -> f64 {
+    let one = |s: &Source| {
+        // Pixels in units that do not matter, times the light on each.
+        let lit: f64 = s.sines(grid, limit).map(|[low, high]| high - low).iter().product();
+        let strongest = s.amplitude.abs() / s.distance;
+        [lit * s.amplitude * s.amplitude, lit * s.distance * s.distance, strongest]
+    };
+    let add = |a: [f64; 3], b: [f64; 3]| [a[0] + b[0], a[1] + b[1], a[2].max(b[2])];
+    let parts: Vec<[f64; 3]> = sources.par_chunks(PART).map(|part| part.iter().map(one).fold([0.0; 3], add)).collect();
+    let [light, pixels, strongest] = parts.into_iter().fold([0.0; 3], add);
+    if light > 0.0 { strongest / (light / pixels).sqrt() } else { f64::INFINITY }
+}
+
 /// Sources that one task sums over: fixed, so that sums do not depend on the number of threads.
 const PART: usize = 4096;
 
@@ -167,5 +182,22 @@ mod tests {
         // On the panel itself: one pixel, all light inside.
         let on = of(&[point(1e-5, 0.0, 1.0)]);
         assert!(on.light_outside < 1e-12 && (on.pairs - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn contrast_is_that_of_the_strongest_wave_over_what_is_lit() {
+        let grid = Grid::new(100, 100, 8e-6, 8e-6).expect("grid");
+        let optics = Optics::new(&grid, 633e-9).expect("optics");
+        let limit = [0, 1].map(|axis| optics.wavelength * optics.taper[axis].limit);
+        let of = |points: &[PointSource]| contrast(&sources(points).expect("sources"), &grid, limit);
+        let even = of(&[point(0.0, 0.2, 2.0), point(1e-5, -0.2, -2.0)]);
+        assert!((even - 1.0).abs() < 1e-6, "{even}");
+        // One of two twice as bright: 2/√2.5.
+        let uneven = of(&[point(0.0, 0.2, 1.0), point(0.0, 0.2, 2.0)]);
+        assert!((uneven - 2.0 / 2.5f64.sqrt()).abs() < 1e-6, "{uneven}");
+        // A bright one beside the cone counts with its whole wave, but lights nothing; nor does anything alone there.
+        let beside = of(&[point(0.0, 0.2, 1.0), point(0.1, 0.2, 50.0)]);
+        assert!(beside > 49.0, "{beside}");
+        assert_eq!(of(&[point(0.1, 0.2, 1.0)]), f64::INFINITY);
     }
 }

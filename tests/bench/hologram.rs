@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench hologram -- [case…]`, cases: `main` (161,056 points → 1920 × 1080, 8 µm, 632.8 nm,
 //! z −0.20 … −0.25 m, every engine against 20,000 exact pixels, random and smooth phase; the default), `random` or `smooth` (one of
-//! them), `quick` (both against 500), `million`,
+//! them), `quick` (both against 500), `tiles` (that engine alone, on every wide instruction set), `million`,
 //! `uhd` (3840 × 2160, 3.74 µm, z −0.10 … −0.15 m), `growth` (against points and pixels, beside the cost model),
 //! `planner` (its choice against the best engine), `sets` (instruction sets), `gpu`.
 
@@ -97,7 +97,7 @@ fn run(
     let errors: Vec<String> =
         references.iter().map(|r| format!("{:.2e}", r.error(&computed.field.samples, grid))).collect();
     println!(
-        "{label:<26} {:<8} {:<8} wall {wall:8.3} s (best {:.3}) cpu {cpu:8.2} s  {:8.2e} pairs/s  error {} (bound {:.2e})  {} MB  predicted {:.3} s | {}",
+        "{label:<26} {:<8} {:<12} wall {wall:8.3} s (best {:.3}) cpu {cpu:8.2} s  {:8.2e} pairs/s  error {} (bound {:.2e})  {} MB  predicted {:.3} s | {}",
         report.method.name(),
         report.instruction_set.name(),
         times[0].0,
@@ -135,6 +135,23 @@ fn main_case(pixels: usize, phases: &[bool]) {
         }
         run(label, &points, &grid, &settings(Some(Method::Tiles), 2e-3), &all, 1);
         run(label, &points, &grid, &settings(Some(Method::Direct), 1e-3), &all, 1);
+    }
+}
+
+/// The tile engine with 16-bit and with f32 products, where the machine has both.
+fn tiles() {
+    let grid = hd();
+    for smooth in [false, true] {
+        let label = if smooth { "tiles, smooth phase" } else { "tiles, random phase" };
+        let points = cloud(161_056, &grid, [-0.25, -0.20], smooth);
+        let reference = Reference::new(&points, &grid, 1_000);
+        let sets = InstructionSet::available();
+        for set in sets.into_iter().filter(|set| *set != InstructionSet::Portable && *set != InstructionSet::Avx2) {
+            for error in [2e-3, 1e-3] {
+                let settings = HologramSettings { instruction_set: Some(set), ..settings(Some(Method::Tiles), error) };
+                run(label, &points, &grid, &settings, &[&reference], 1);
+            }
+        }
     }
 }
 
@@ -264,6 +281,7 @@ fn main() {
         }
     }
     large_cases(has("million"), has("uhd"));
-    let others: [(&str, fn()); 4] = [("growth", growth), ("planner", planner), ("sets", sets), ("gpu", gpu)];
+    let others: [(&str, fn()); 5] =
+        [("tiles", tiles), ("growth", growth), ("planner", planner), ("sets", sets), ("gpu", gpu)];
     others.iter().filter(|(name, _)| has(name)).for_each(|(_, case)| case());
 }

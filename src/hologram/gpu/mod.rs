@@ -24,7 +24,7 @@ mod strokes;
 use super::Cull;
 use super::definition::Optics;
 use super::sources::Source;
-use super::tiles::{Axis, Class, EdgeTable, Limit};
+use super::tiles::{Axis, Class, EdgeTable, Kernel, Limit, Products};
 use crate::error::Result;
 use crate::field::{Field, Grid};
 use crate::progress::Progress;
@@ -36,9 +36,6 @@ use std::time::Instant;
 
 /// Side of a cell [px]; as in the shader.
 pub(crate) const CELL: usize = 256;
-
-/// Rows of the shader's tile; classes that need smaller ones take the exact path.
-const TILE_ROWS: usize = 32;
 
 /// Memory for the points of the cells that are prepared together [bytes].
 const WAVE: u64 = 32 << 20;
@@ -110,7 +107,8 @@ fn measured_rate(device: &Device) -> Result<f64> {
     let source = Source { x: 0.0, y: 0.0, distance: 0.3, sign: 1.0, amplitude: 1.0, turns: 0.0 };
     let sources = vec![source; 1024];
     let indexes: Vec<usize> = (0..sources.len()).collect();
-    let classes = super::tiles::classify(&optics, &grid, &sources, &indexes, Cull::None, 1e-2, &Progress::new());
+    let (products, progress) = (Products::Shader, Progress::new());
+    let classes = super::tiles::classify(&optics, &grid, &sources, &indexes, Cull::None, products, 1e-2, &progress);
     let mut field = Field::zeros(grid, optics.wavelength);
     let mut seconds = f64::INFINITY;
     // The first run compiles and raises clocks.
@@ -266,11 +264,10 @@ impl Set {
             mapped_at_creation: false,
         });
         device.queue.write_buffer(&edges, 0, bytemuck::cast_slice(values));
-        let shape = class.shape;
         Self {
             members: class.members(sources),
             tangent: class.tangent(optics, limit),
-            pipeline: usize::from(shape.exact || shape.height < TILE_ROWS),
+            pipeline: usize::from(class.shape.kernel == Kernel::Paths),
             edges,
             job,
         }

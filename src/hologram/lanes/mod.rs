@@ -1,4 +1,4 @@
-//! Vectors of f32 for the inner loops: one source, three instruction sets.
+//! Vectors of f32 for the inner loops: one source, three widths.
 //!
 //! A kernel is written once, generic over [`Lanes`] and inlined into a function that enables the instruction set;
 //! [`InstructionSet::detect`] chooses it at run time. All paths do the same operations in the same order per lane, but
@@ -16,6 +16,8 @@ pub(crate) use x86::{Avx2, Avx512};
 /// An instruction set that the kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstructionSet {
+    /// AVX-512 F, DQ, BW, VL and VNNI: 16 lanes, and products of 16-bit integers.
+    Avx512Vnni,
     /// AVX-512 F, DQ and VL: 16 lanes.
     Avx512,
     /// AVX2 and FMA: 8 lanes.
@@ -35,7 +37,13 @@ impl InstructionSet {
         #[cfg(target_arch = "x86_64")]
         {
             let fma = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
-            if fma && is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+            let wide = is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512vl");
+            if fma && wide {
+                if is_x86_feature_detected!("avx512bw") && is_x86_feature_detected!("avx512vnni") {
+                    sets.push(Self::Avx512Vnni);
+                }
                 sets.push(Self::Avx512);
             }
             if fma {
@@ -48,6 +56,7 @@ impl InstructionSet {
     /// Its name.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Avx512Vnni => "AVX-512 VNNI",
             Self::Avx512 => "AVX-512",
             Self::Avx2 => "AVX2",
             Self::Portable => "portable",
@@ -166,7 +175,9 @@ macro_rules! dispatch {
         }
         match $set {
             #[cfg(target_arch = "x86_64")]
-            $crate::hologram::lanes::InstructionSet::Avx512 => avx512($($name),*),
+            $crate::hologram::lanes::InstructionSet::Avx512Vnni | $crate::hologram::lanes::InstructionSet::Avx512 => {
+                avx512($($name),*)
+            }
             #[cfg(target_arch = "x86_64")]
             $crate::hologram::lanes::InstructionSet::Avx2 => avx2($($name),*),
             _ => $kernel::<$crate::hologram::lanes::Portable>($($name),*),

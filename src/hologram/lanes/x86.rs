@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 
 /// Sixteen f32 (AVX-512 F and DQ).
 #[derive(Clone, Copy)]
-pub(crate) struct Avx512(__m512);
+pub(crate) struct Avx512(pub(crate) __m512);
 
 /// Eight f32 (AVX2 and FMA).
 #[derive(Clone, Copy)]

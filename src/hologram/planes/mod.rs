@@ -223,7 +223,7 @@ const BACK_COLUMN: f64 = 4.8e-9;
 const BACK_ROW: f64 = 3.5e-9;
 
 /// A pixel of the panel.
-const WINDOW: f64 = 3.5e-9;
+const WINDOW: f64 = 8e-9;
 
 /// A point, and a pixel of its kernel.
 const DAB: f64 = 0.7e-6;

@@ -93,12 +93,12 @@ impl<'a> Limit<'a> {
 
 /// A phase and an amplitude along one axis of the tile, as polynomials of the index from its centre.
 #[derive(Clone, Copy)]
-struct Factor<'a> {
+pub(super) struct Factor<'a> {
     /// Turns: base + f[0]·u + f[1]·u² + f[2]·u³.
-    base: f32,
+    pub(super) base: f32,
     f: [f32; 3],
     /// amplitude·(1 + slope·u).
-    amplitude: f32,
+    pub(super) amplitude: f32,
     slope: f32,
     sign: f32,
     edge: Edge<'a>,
@@ -122,7 +122,7 @@ enum Edge<'a> {
 /// Third-order expansion of the sphere along an axis: `offset` = Δ on it at the tile's centre, `half` its half size in
 /// indexes, `inverse` = 1/r.
 #[inline(always)]
-fn factor<'a>(job: &Job<'a>, axis: &Axis, p: &Relative, offset: f64, inverse: f64, half: f64) -> Factor<'a> {
+pub(super) fn factor<'a>(job: &Job<'a>, axis: &Axis, p: &Relative, offset: f64, inverse: f64, half: f64) -> Factor<'a> {
     let step = axis.pitch * inverse;
     let s = offset * inverse;
     let bend = 1.0 - s * s;
@@ -157,8 +157,11 @@ fn factor<'a>(job: &Job<'a>, axis: &Axis, p: &Relative, offset: f64, inverse: f6
 }
 
 /// The factor at indexes `u`: (re, im).
+///
+/// # Safety
+/// As [`Lanes`].
 #[inline(always)]
-unsafe fn evaluate<L: Lanes>(factor: &Factor, u: L) -> (L, L) {
+pub(super) unsafe fn evaluate<L: Lanes>(factor: &Factor, u: L) -> (L, L) {
     // SAFETY: the caller's promise; a level has its eight runs of sixteen.
     unsafe {
         let [f1, f2, f3] = factor.f.map(|f| L::splat(f));
@@ -205,8 +208,8 @@ pub(crate) unsafe fn taper<L: Lanes>(t: L, level: &[f32]) -> (L, L) {
 /// Memory of one thread: the factors of a batch and the tile that they are summed into.
 #[derive(Debug, Default)]
 pub(super) struct Panels {
-    x: Aligned,
-    y: Aligned,
+    pub(super) x: Aligned,
+    pub(super) y: Aligned,
     line: Aligned,
     /// Real and imaginary part, `width × height` each.
     pub(super) re: Aligned,
@@ -216,15 +219,27 @@ pub(super) struct Panels {
 
 /// Memory of [`Panels`] for a tile [bytes].
 pub(super) fn bytes(width: usize, height: usize) -> u64 {
-    let factors = BATCH * 2 * (width + height.next_multiple_of(ROWS)) + 2 * (height.max(width) + 32);
+    let factors = BATCH * 2 * width + row_factors(height) + 2 * (height.max(width) + 32);
     4 * (factors + 2 * width * height + 5 * 16) as u64
+}
+
+/// Values that the factors of rows take, with the strides of either kind of product.
+fn row_factors(height: usize) -> usize {
+    (BATCH * 2 * height.next_multiple_of(ROWS)).max(BATCH / 2 * 3 * stride(height))
+}
+
+/// Stride of the rows' factors in products of integers: whole vectors, an odd number of cache lines, so that the lines
+/// of one block of rows do not fall on the same sets of the first-level cache.
+pub(super) const fn stride(height: usize) -> usize {
+    let lines = height.div_ceil(16);
+    16 * (lines + (lines + 1) % 2)
 }
 
 impl Panels {
     /// Room for a tile, dark.
     pub(super) fn clear(&mut self, width: usize, height: usize) {
         self.x.reserve(BATCH * 2 * width);
-        self.y.reserve(BATCH * 2 * height.next_multiple_of(ROWS));
+        self.y.reserve(row_factors(height));
         self.line.reserve(2 * (height.max(width) + 32));
         for part in [&mut self.re, &mut self.im] {
             part.reserve(width * height);

@@ -5,27 +5,35 @@
 //! assumption enters: each factor is the sphere's own expansion about the tile, with f64 set-up per point and tile.
 //! Where no tile is small enough (wide angles, near points) each pixel takes its own exact path.
 //!
+//! The products are of f32, or of 16-bit integers where the processor multiplies those in pairs and their rounding is a
+//! small part of the wanted error.
+//!
 //! The engines `direct` and `tiles` are this one, with tiles small enough for 1e-4, or for the error that was asked.
 
 mod edge;
+#[cfg(target_arch = "x86_64")]
+mod fixed;
+#[cfg(target_arch = "x86_64")]
+mod integer;
 mod kernel;
 mod pixels;
 mod shape;
 
 pub(crate) use edge::EdgeTable;
 pub(crate) use kernel::{Axis, Limit, taper};
-pub(crate) use shape::Shape;
+pub(crate) use shape::{Kernel, Products, Shape};
 
 use super::Cull;
 use super::definition::Optics;
 use super::lanes::{InstructionSet, dispatch};
-use super::sources::{Source, tilt};
+use super::sources::{Source, contrast, tilt};
 use crate::error::Result;
 use crate::field::{Complex32, Field, Grid};
 use crate::progress::Progress;
 use kernel::{BATCH, Job, Panels, Relative, add_batch};
 use pixels::add_exact;
 use rayon::prelude::*;
+use shape::Seen;
 
 /// Tiles whose results wait together to be added to the field.
 const WAVE: usize = 64;
@@ -60,15 +68,10 @@ impl Class {
         };
         WAVE as u64 * tile + table + (size_of::<Source>() * self.sources.len()) as u64
     }
-    /// Predicted work on AVX-512 [core-seconds]: set-up of each point on each tile that its cone touches, factors of
-    /// tile width + height, products of tile area; measured on a 3.7 GHz Zen 4.
+    /// Predicted work on AVX-512 [core-seconds]: that of each point on each tile that its cone touches.
     pub(crate) fn core_seconds(&self, optics: &Optics, grid: &Grid, sources: &[Source], cull: Cull) -> f64 {
         let (width, height) = (self.shape.width as f64, self.shape.height as f64);
-        let tile = if self.shape.exact {
-            height * (4e-8 + width * 1.4e-9)
-        } else {
-            4e-8 + 6e-10 * (width + height) + width * height * 7.5e-11
-        };
+        let tile = self.shape.seconds();
         let count = |source: &Source| {
             let spans = source.span(grid);
             let tiles = |axis: usize, size: f64| {
@@ -76,8 +79,8 @@ impl Class {
                 let cone = if cull == Cull::None { f64::INFINITY } else { optics.cone(axis, source.distance) };
                 let span = (spans[axis][1].min(cone) - spans[axis][0].max(-cone)).max(0.0);
                 // A span that is not on tile borders touches one tile more; one that fills the panel does not.
-                let whole = (spans[axis][1] - spans[axis][0] + pitch) / (size * pitch);
-                (span / (size * pitch) + 1.0).min(whole.ceil())
+                let whole = [grid.width, grid.height][axis].div_ceil(size as usize) as f64;
+                (span / (size * pitch) + 1.0).min(whole)
             };
             tiles(0, width) * tiles(1, height)
         };
@@ -135,12 +138,14 @@ fn ordered(x: f64) -> i64 {
 
 /// Sorts sources into classes, a factor √2 of distance each, and chooses their tiles; leaves some out when asked to
 /// stop.
+#[allow(clippy::too_many_arguments)] // what a division knows
 pub(crate) fn classify(
     optics: &Optics,
     grid: &Grid,
     sources: &[Source],
     indexes: &[usize],
     cull: Cull,
+    products: Products,
     error: f64,
     progress: &Progress,
 ) -> Vec<Class> {
@@ -176,8 +181,14 @@ pub(crate) fn classify(
                 || ([f64::INFINITY, 0.0], [0.0; 2]),
                 |(d, s), (e, t)| ([d[0].min(e[0]), d[1].max(e[1])], [s[0].max(t[0]), s[1].max(t[1])]),
             );
-            let tilt = tilt(&chosen, grid, limit);
-            let shape = Shape::choose(optics, distance[0].max(1e-12), sine, tilt, error);
+            let seen = Seen {
+                panel: [grid.width, grid.height],
+                distance: distance[0].max(1e-12),
+                sine,
+                tilt: tilt(&chosen, grid, limit),
+                contrast: contrast(&chosen, grid, limit),
+            };
+            let shape = Shape::choose(optics, &seen, products, error);
             Class { sources: members, shape, distance }
         })
         .collect()
@@ -196,7 +207,7 @@ pub(crate) fn add(
     let table = class.edges(optics, cull, progress);
     let limit = Limit::new(cull, &table);
     let axes = [Axis::new(optics, 0, limit), Axis::new(optics, 1, limit)];
-    let Shape { width, height, exact, .. } = class.shape;
+    let Shape { width, height, kernel, .. } = class.shape;
     let job = Job { width, height, axes: &axes, wavenumber: 1.0 / optics.wavelength, limit };
     let members = class.members(sources);
     let tangent = class.tangent(optics, limit);
@@ -235,12 +246,12 @@ pub(crate) fn add(
                         if progress.stopped() {
                             return None;
                         }
-                        flush(set, &job, &batch, &mut panels, exact);
+                        flush(set, &job, &batch, &mut panels, kernel);
                         (count, lit) = (0, true);
                     }
                 }
                 if count > 0 {
-                    flush(set, &job, &batch[..count], &mut panels, exact);
+                    flush(set, &job, &batch[..count], &mut panels, kernel);
                 }
                 progress.advance(work);
                 (lit || count > 0).then_some(panels)
@@ -262,13 +273,17 @@ pub(crate) fn add(
     Ok(())
 }
 
-fn flush(set: InstructionSet, job: &Job, points: &[Relative], panels: &mut Panels, exact: bool) {
-    // SAFETY: the set was detected on this machine; the panels were cleared for this job.
+fn flush(set: InstructionSet, job: &Job, points: &[Relative], panels: &mut Panels, kernel: Kernel) {
+    // SAFETY: the set was detected on this machine, integers were chosen for one that has them; the panels were cleared
+    // for this job.
     unsafe {
-        if exact {
-            dispatch!(set, add_exact(job: &Job, points: &[Relative], panels: &mut Panels));
-        } else {
-            dispatch!(set, add_batch(job: &Job, points: &[Relative], panels: &mut Panels));
+        match kernel {
+            Kernel::Paths => dispatch!(set, add_exact(job: &Job, points: &[Relative], panels: &mut Panels)),
+            #[cfg(target_arch = "x86_64")]
+            Kernel::Integer if set == InstructionSet::Avx512Vnni => integer::add_batch(job, points, panels),
+            Kernel::Float | Kernel::Integer => {
+                dispatch!(set, add_batch(job: &Job, points: &[Relative], panels: &mut Panels));
+            }
         }
     }
 }
@@ -285,3 +300,6 @@ fn scatter(band: &mut [Complex32], stride: usize, column: usize, width: usize, p
         }
     }
 }
+
+#[cfg(all(test, target_arch = "x86_64"))]
+mod tests;

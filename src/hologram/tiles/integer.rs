@@ -1,0 +1,308 @@
+//! The tile engine's products in 16-bit integers, for processors with AVX-512 VNNI.
+//!
+//! `vpdpwssd` multiplies and adds twice as many 16-bit numbers as an FMA does f32, and a complex product takes three real
+//! ones: re = P₁ − P₂, im = P₃ − P₁ − P₂ with P₁ = Σ x_r·y_r, P₂ = Σ x_i·y_i, P₃ = Σ (x_r + x_i)(y_r + y_i). Integer sums
+//! are exact, so nothing is lost in the differences; what is lost is the rounding of the factors
+//! ([`INTEGER_NOISE`](super::shape::INTEGER_NOISE)).
+//!
+//! Sums do not overflow: they are taken modulo 2³², where P₁, P₂ and P₃ may wrap, but |re|, |im| ≤ Σ|x||y| ≤
+//! [`BATCH`]·[`LARGEST`]² < 2³¹, so what the differences leave modulo 2³² is the value itself.
+
+use super::fixed::{FULL, Indexes, LONGEST, Strength, UNIT, Wave, evaluate, pair};
+use super::kernel::{self, BATCH, COLUMNS, Factor, Job, Limit, Panels, ROWS, Relative, factor, stride};
+use super::shape::OVERSHOOT;
+use crate::hologram::lanes::Avx512;
+use std::arch::x86_64::*;
+
+/// Pairs of points of a batch.
+const PAIRS: usize = BATCH / 2;
+
+/// Bound on a rounded factor's modulus: the largest cosine times the largest multiplier (which its and its slope's
+/// roundings may lift by 1.5), or a tapered factor that f32 has rounded up, and half a place of either part.
+const LARGEST: i64 = {
+    let flat = LONGEST * (FULL + 1.5) / 32_768.0 + 0.708;
+    let tapered = UNIT * 1.000_1 + 0.708;
+    (if flat > tapered { flat } else { tapered }) as i64 + 1
+};
+
+// |re|, |im| of a batch's sums fit 32 bits; a part's and a sum of parts' fit 16.
+const _: () = assert!(BATCH as i64 * LARGEST * LARGEST < 1 << 31 && 2 * LARGEST < 1 << 15);
+
+/// Points of a batch by quantity and axis, padded with dark ones.
+struct Batch {
+    /// Amplitude at the tile's centre.
+    amplitude: [f64; BATCH],
+    /// 1/r at the tile's centre [1/m].
+    inverse: [f64; BATCH],
+    /// Phase at the tile's centre [turns].
+    turns: [f32; BATCH],
+    /// Per axis and power of the index.
+    waves: [[[f32; BATCH]; 4]; 2],
+    /// Part by which the amplitude grows an index.
+    slope: [[f64; BATCH]; 2],
+    /// Above zero where the taper or the cut touches the tile.
+    edge: [[f64; BATCH]; 2],
+}
+
+impl Batch {
+    /// As [`factor`], in whole vectors.
+    #[inline(always)]
+    fn new(job: &Job, points: &[Relative], half: [f64; 2]) -> Self {
+        let dark = Relative { distance: 1.0, sign: 1.0, ..Relative::default() };
+        let of = |value: fn(&Relative) -> f64| -> [f64; BATCH] {
+            let mut values = [value(&dark); BATCH];
+            values.iter_mut().zip(points).for_each(|(to, p)| *to = value(p));
+            values
+        };
+        let (offsets, distance, sign) = ([of(|p| p.dx), of(|p| p.dy)], of(|p| p.distance), of(|p| p.sign));
+        let (turns, own) = (of(|p| p.turns), of(|p| p.amplitude));
+        let mut batch = Self {
+            amplitude: [0.0; BATCH],
+            inverse: [0.0; BATCH],
+            turns: [0.0; BATCH],
+            waves: [[[0.0; BATCH]; 4]; 2],
+            slope: [[0.0; BATCH]; 2],
+            edge: [[0.0; BATCH]; 2],
+        };
+        let mut base = [0.0; BATCH];
+        for k in 0..BATCH {
+            let [dx, dy] = [offsets[0][k], offsets[1][k]];
+            let r = (dx * dx + dy * dy + distance[k] * distance[k]).sqrt();
+            batch.inverse[k] = 1.0 / r;
+            batch.amplitude[k] = own[k] / r;
+            let phase = sign[k] * r * job.wavenumber + turns[k];
+            base[k] = phase - phase.floor();
+            batch.turns[k] = base[k] as f32;
+        }
+        for axis in 0..2 {
+            let constants = &job.axes[axis];
+            let (tapered, cut) = match job.limit {
+                Limit::None => (0.0, 0.0),
+                Limit::Hard => (0.0, 1.0),
+                Limit::Soft(_) => (1.0, 0.0),
+            };
+            for k in 0..BATCH {
+                let step = constants.pitch * batch.inverse[k];
+                let s = offsets[axis][k] * batch.inverse[k];
+                let bend = 1.0 - s * s;
+                let scale = sign[k] * constants.pitch * job.wavenumber;
+                let second = 0.5 * scale * bend * step;
+                // Whole turns an index are none; they leave whole halves of a turn at the centre.
+                let whole = (scale * s).round_ties_even();
+                let turns = if axis == 0 { base[k] } else { 0.0 } - whole * half[axis];
+                let waves = &mut batch.waves[axis];
+                waves[0][k] = (65_536.0 * (turns - turns.floor())) as f32;
+                waves[1][k] = (65_536.0 * (scale * s - whole)) as f32;
+                waves[2][k] = (65_536.0 * second) as f32;
+                waves[3][k] = (-65_536.0 * second * s * step) as f32;
+                batch.slope[axis][k] = -s * step;
+                let first = constants.scale * bend * step.abs() * half[axis];
+                let (position, reach) = (constants.scale * s.abs() + constants.offset, step.abs() * half[axis]);
+                let taper = position + first * (1.0 + 1.5 * s.abs() * reach);
+                let limit = distance[k] * constants.tangent;
+                let beyond = offsets[axis][k].abs() + half[axis] * constants.pitch.abs() - limit;
+                batch.edge[axis][k] = if tapered > 0.0 { taper } else { cut * beyond };
+            }
+        }
+        batch
+    }
+    /// Largest amplitude anywhere in the tile, `own` at its centre.
+    fn peak(&self, axis: usize, own: impl Fn(usize) -> f64, half: f64) -> f64 {
+        let one = |k: usize| {
+            let overshoot = if self.edge[axis][k] > 0.0 { OVERSHOOT } else { 1.0 };
+            own(k).abs() * (1.0 + self.slope[axis][k].abs() * half) * overshoot
+        };
+        (0..BATCH).map(one).fold(0.0, f64::max)
+    }
+}
+
+/// Where factors go, in 32-bit lanes: steps of a pair of points, of a part, of a block of vectors, vectors of a block.
+struct Layout {
+    pair: usize,
+    part: usize,
+    block: usize,
+    vectors: usize,
+}
+
+/// Adds a batch of points to the tile in `panels`.
+///
+/// # Safety
+/// The processor has the features below. `panels` has been cleared for the job's size; width is a multiple of
+/// [`COLUMNS`], height of [`ROWS`]; at most [`BATCH`] points.
+#[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl,avx512vnni,avx2,fma")]
+pub(super) unsafe fn add_batch(job: &Job, points: &[Relative], panels: &mut Panels) {
+    assert!(points.len() <= BATCH && job.width.is_multiple_of(COLUMNS) && job.height.is_multiple_of(ROWS));
+    let half = [0.5 * (job.width as f64 - 1.0), 0.5 * (job.height as f64 - 1.0)];
+    let batch = Batch::new(job, points, half);
+    let unit = [batch.peak(0, |k| batch.amplitude[k], half[0]), batch.peak(1, |_| 1.0, half[1])];
+    if unit[0] == 0.0 {
+        return;
+    }
+    let columns = Layout { pair: 3 * COLUMNS, part: COLUMNS, block: PAIRS * 3 * COLUMNS, vectors: COLUMNS / 16 };
+    let stride = stride(job.height);
+    let rows = Layout { pair: 3 * stride, part: stride, block: 16, vectors: 1 };
+    let x = panels.x.values_mut();
+    let y = panels.y.values_mut();
+    assert!(x.len() >= PAIRS * 3 * job.width && y.len() >= PAIRS * 3 * stride);
+    let (x, y) = (x.as_mut_ptr().cast::<i32>(), y.as_mut_ptr().cast::<i32>());
+    // SAFETY: as asserted.
+    unsafe {
+        fill(job, points, &batch, 0, unit[0], half[0], job.width / 16, &columns, x);
+        fill(job, points, &batch, 1, unit[1], half[1], job.height.div_ceil(16), &rows, y);
+    }
+    let scale = (unit[0] * unit[1] / (UNIT * UNIT)) as f32;
+    let (re, im) = (panels.re.values_mut(), panels.im.values_mut());
+    assert!(re.len() >= job.width * job.height && im.len() >= job.width * job.height);
+    for column in 0..job.width / COLUMNS {
+        for row in 0..job.height / ROWS {
+            let at = row * ROWS * job.width + column * COLUMNS;
+            // SAFETY: the block lies inside the tile, every pair's factors were filled above.
+            unsafe {
+                let (re, im) = (re.as_mut_ptr().add(at), im.as_mut_ptr().add(at));
+                let (x, y) = (x.add(column * columns.block), y.add(row * ROWS));
+                product(points.len().div_ceil(2), x, y, stride, re, im, job.width, scale);
+            }
+        }
+    }
+}
+
+/// Factors of every pair along an axis.
+#[inline]
+#[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl,avx512vnni,avx2,fma")]
+#[allow(clippy::too_many_arguments)] // one axis's part of the kernel
+unsafe fn fill(
+    job: &Job,
+    points: &[Relative],
+    batch: &Batch,
+    axis: usize,
+    unit: f64,
+    half: f64,
+    vectors: usize,
+    layout: &Layout,
+    to: *mut i32,
+) {
+    let inverse = 1.0 / unit;
+    let amplitude = |k: usize| inverse * if axis == 0 { batch.amplitude[k] } else { 1.0 };
+    let wave = |k: usize| {
+        let [base, first, second, third] = &batch.waves[axis];
+        Wave([base[k], first[k], second[k], third[k]])
+    };
+    let strength = |k: usize| Strength::of(amplitude(k), batch.slope[axis][k]);
+    let tapered = |k: usize| {
+        let p = points.get(k)?;
+        let offset = if axis == 0 { p.dx } else { p.dy };
+        let mut found = factor(job, &job.axes[axis], p, offset, batch.inverse[k], half);
+        found.base = if axis == 0 { batch.turns[k] } else { 0.0 };
+        found.amplitude = (amplitude(k) * UNIT) as f32;
+        Some(found)
+    };
+    let start = Indexes::from(-half as f32);
+    for number in 0..points.len().div_ceil(2) {
+        let [first, second] = [2 * number, 2 * number + 1];
+        let place = |vector: usize| {
+            number * layout.pair + vector / layout.vectors * layout.block + vector % layout.vectors * 16
+        };
+        let mut at = start;
+        if batch.edge[axis][first] > 0.0 || batch.edge[axis][second] > 0.0 {
+            let [first, second] = [tapered(first), tapered(second)];
+            for vector in 0..vectors {
+                // SAFETY: this function enables the instruction set; the place is inside the panel, as the caller
+                // asserted.
+                unsafe {
+                    let (a, b) = (rounded(&first, at.u), rounded(&second, at.u));
+                    let (re, im) = (pair(a.0, b.0), pair(a.1, b.1));
+                    put([re, im, _mm512_add_epi16(re, im)], to.add(place(vector)), layout.part);
+                }
+                at = at.next();
+            }
+        } else {
+            let (waves, strengths) = ([wave(first), wave(second)], [strength(first), strength(second)]);
+            for vector in 0..vectors {
+                // SAFETY: as above.
+                unsafe { put(evaluate(waves, strengths, at), to.add(place(vector)), layout.part) };
+                at = at.next();
+            }
+        }
+    }
+}
+
+/// A factor as integers; dark where there is none.
+///
+/// # Safety
+/// As [`Lanes`](crate::hologram::lanes::Lanes).
+#[inline]
+#[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl,avx512vnni,avx2,fma")]
+unsafe fn rounded(factor: &Option<Factor>, u: __m512) -> (__m512i, __m512i) {
+    match factor {
+        Some(factor) => {
+            // SAFETY: the caller's promise.
+            let (re, im) = unsafe { kernel::evaluate(factor, Avx512(u)) };
+            (_mm512_cvtps_epi32(re.0), _mm512_cvtps_epi32(im.0))
+        }
+        None => (_mm512_setzero_si512(), _mm512_setzero_si512()),
+    }
+}
+
+/// Writes the three parts of sixteen indexes of a pair, `step` lanes apart.
+///
+/// # Safety
+/// Sixteen lanes at each place are writable.
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw")]
+unsafe fn put(parts: [__m512i; 3], to: *mut i32, step: usize) {
+    // SAFETY: the caller's promise.
+    unsafe {
+        _mm512_storeu_epi32(to, parts[0]);
+        _mm512_storeu_epi32(to.add(step), parts[1]);
+        _mm512_storeu_epi32(to.add(2 * step), parts[2]);
+    }
+}
+
+/// Adds scale·Σ y·x to a block of `ROWS` rows × `COLUMNS` columns of the tile.
+#[inline]
+#[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl,avx512vnni,avx2,fma")]
+#[allow(clippy::too_many_arguments)] // two panels and the tile
+unsafe fn product(
+    pairs: usize,
+    mut x: *const i32,
+    mut y: *const i32,
+    stride: usize,
+    re: *mut f32,
+    im: *mut f32,
+    width: usize,
+    scale: f32,
+) {
+    const V: usize = COLUMNS / 16;
+    let mut sums = [[[_mm512_setzero_si512(); V]; ROWS]; 3];
+    for _ in 0..pairs {
+        for (part, sums) in sums.iter_mut().enumerate() {
+            // SAFETY: the caller's promise.
+            let column = |v: usize| unsafe { _mm512_loadu_epi32(x.add(part * COLUMNS + v * 16)) };
+            let columns: [__m512i; V] = [column(0), column(1)];
+            for (row, sums) in sums.iter_mut().enumerate() {
+                // SAFETY: as above.
+                let y = _mm512_set1_epi32(unsafe { *y.add(part * stride + row) });
+                for (sum, x) in sums.iter_mut().zip(columns) {
+                    *sum = _mm512_dpwssd_epi32(*sum, x, y);
+                }
+            }
+        }
+        // SAFETY: as above; after the last pair one past it.
+        (x, y) = unsafe { (x.add(3 * COLUMNS), y.add(3 * stride)) };
+    }
+    let scale = _mm512_set1_ps(scale);
+    let [first, second, third] = sums;
+    for row in 0..ROWS {
+        for v in 0..V {
+            let (p, q, both) = (first[row][v], second[row][v], third[row][v]);
+            let parts = [(re, _mm512_sub_epi32(p, q)), (im, _mm512_sub_epi32(_mm512_sub_epi32(both, p), q))];
+            for (to, sum) in parts {
+                // SAFETY: the block lies inside the tile.
+                unsafe {
+                    let to = to.add(row * width + v * 16);
+                    _mm512_storeu_ps(to, _mm512_fmadd_ps(scale, _mm512_cvtepi32_ps(sum), _mm512_loadu_ps(to)));
+                }
+            }
+        }
+    }
+}
