@@ -213,6 +213,9 @@ pub(crate) struct ComputeArgs {
     /// Layers do not hide what is behind them.
     #[arg(long, requires = "layers")]
     pub(crate) see_through: bool,
+    /// A scene seen truly from each segment of so many pixels of the panel, as plates are: with --placement model.
+    #[arg(long, value_name = "PIXELS", conflicts_with_all = ["layers", "engine"])]
+    pub(crate) views: Option<u64>,
     #[command(flatten)]
     pub(crate) hologram: HologramArgs,
 }

@@ -110,6 +110,10 @@ pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
         layers::compute(args, &source, &panel, &bar.progress, &mut report)?;
         return Ok(report);
     }
+    if let Some(segment) = args.views {
+        super::true_views::compute(args, (&source, segment), &panel, &bar.progress, &mut report)?;
+        return Ok(report);
+    }
     let points = load_points(&source, (&args.light, &args.placement, White::Auto), &panel, &bar.progress, &mut report)?;
     if let Some(lasers) = &panel.lasers {
         colour::compute(args, (&panel, lasers), &points, &bar.progress, &mut report)?;

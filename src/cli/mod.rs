@@ -30,6 +30,7 @@ mod serve;
 mod serve_args;
 mod show;
 mod subframes;
+mod true_views;
 
 use args::{Cli, Command};
 use clap::Parser;

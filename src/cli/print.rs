@@ -3,6 +3,7 @@
 use super::args::{ExportArgs, ExportFormat, PrintArgs, PrintCommand, VerifyArgs, White};
 use super::bar::Bar;
 use super::report::{Report, count, seconds};
+use super::scene_args::FileArgs;
 use holodrive::files;
 use holodrive::hologram::InstructionSet;
 use holodrive::print::export::{Format, Frames, export};
@@ -18,6 +19,31 @@ pub(super) fn print(args: &PrintArgs, json: bool) -> Result<Report> {
         Some(PrintCommand::Export(args)) => write(args),
         None => compute(args, json),
     }
+}
+
+/// A scene or a cloud, and how it is lit: its flags, bounces and photons.
+pub(super) fn task(
+    input: &Path,
+    (file, bounces, photons): (&FileArgs, u32, u32),
+    white: Option<White>,
+) -> Result<Task> {
+    Ok(Task {
+        camera: file.camera.clone(),
+        animation: file.animation.clone(),
+        time: file.time,
+        viewer_light: file.viewer_light,
+        bounces,
+        photons,
+        white: match white {
+            None | Some(White::Auto) => None,
+            Some(White::None) => Some(f32::MAX),
+            Some(White::At(white)) if white > 0.0 && white.is_finite() => Some(white),
+            Some(White::At(white)) => {
+                return Err(Error::parameter("white", format!("{white} must be greater than zero")));
+            }
+        },
+        ..Task::new(input.to_path_buf())
+    })
 }
 
 fn compute(args: &PrintArgs, json: bool) -> Result<Report> {
@@ -39,23 +65,8 @@ fn compute(args: &PrintArgs, json: bool) -> Result<Report> {
         Some(text) => Shard::parse(text, |name| std::env::var(name).ok())?,
         None => Shard::default(),
     };
-    let task = Task {
-        camera: args.light.file.camera.clone(),
-        animation: args.light.file.animation.clone(),
-        time: args.light.file.time,
-        viewer_light: args.light.file.viewer_light,
-        bounces: args.light.bounces,
-        photons: args.light.photons,
-        white: match args.light.white {
-            None | Some(White::Auto) => None,
-            Some(White::None) => Some(f32::MAX),
-            Some(White::At(white)) if white > 0.0 && white.is_finite() => Some(white),
-            Some(White::At(white)) => {
-                return Err(Error::parameter("white", format!("{white} must be greater than zero")));
-            }
-        },
-        ..Task::new(input.clone())
-    };
+    let light = (&args.light.file, args.light.bounces, args.light.photons);
+    let task = task(input, light, args.light.white)?;
     let settings = task.settings(&plate)?;
     let there = if args.dry_run { None } else { job::look(folder, &settings)? };
     let set = match &there {
