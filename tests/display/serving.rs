@@ -21,6 +21,7 @@ pub(crate) const CASES: &[Case] = &[
     ("a_client_that_dies_leaves_its_last_frame_or_the_idle_one", gone),
     ("bad_clients_disturb_neither_the_panel_nor_another_client", bad_clients),
     ("clients_are_told_when_the_monitor_is_away_and_served_when_it_is_back", unplugged),
+    ("two_panels_are_served_at_once_and_found_by_name", two),
     ("a_corner_toggles_with_every_frame_and_the_rest_stays_exact", trigger),
     ("one_panel_spans_two_monitors_and_nothing_beside_them", region),
     ("serve_refuses_what_it_cannot_do", refused),
@@ -569,6 +570,69 @@ fn unplugged(desk: &Desk) -> Ended {
     let report = served.stop();
     assert_eq!((&report["served"]["shown"], &report["served"]["failed"]), (&2.into(), &1.into()), "{report}");
     Ended::Passed
+}
+
+/// Shows flat levels on both panels, which it finds in the usual place.
+const TWO: &str = "
+import sys, numpy, holodrive
+for line in sys.stdin:
+    try:
+        print('>', holodrive.SLM(), flush=True)
+    except holodrive.Error as error:
+        print('>' + str(error), flush=True)
+    with holodrive.SLM('left') as left, holodrive.SLM('right') as right:
+        assert left.shape == (1080, 1920) and right.shape == (769, 1367)
+        numbers = [left.show(numpy.full(left.shape, 10)).number, right.show(numpy.full(right.shape, 20)).number]
+        print('>' + str(numbers), flush=True)
+    try:
+        holodrive.SLM('middle')
+    except holodrive.Error as error:
+        print('>' + str(error), flush=True)
+    try:
+        left.show(numpy.zeros(left.shape))
+    except holodrive.Error as error:
+        print('>' + str(error), flush=True)
+";
+
+fn two(desk: &Desk) -> Ended {
+    let folder = tempfile::tempdir().expect("folder");
+    let (left, right) = (desk.plug(PANEL), desk.plug(ODD_PANEL));
+    profile(folder.path(), "bits = 8\nwidth = 1367\nheight = 769", 256, "");
+    let runtime = folder.path().display().to_string();
+    let start = |monitor: &str, name: &str, panel: &str| {
+        let mut command = program(desk, folder.path());
+        command.args(["serve", "--local", "--monitor", monitor, "--name", name, "--panel", panel]);
+        let process = command.env("XDG_RUNTIME_DIR", &runtime).stdout(Stdio::piped()).spawn().expect("runs");
+        let mut killed = Killed(process);
+        let output = killed.0.stdout.as_mut().expect("output");
+        BufReader::new(output).read_line(&mut String::new()).expect("first line");
+        killed
+    };
+    let _served = [start(PANEL, "left", "generic"), start(ODD_PANEL, "right", "panel.toml")];
+    let environment = format!("import os; os.environ['XDG_RUNTIME_DIR'] = '{runtime}'\n{TWO}");
+    let mut client = match Python::start("numpy", &environment, &[]) {
+        Ok(client) => client,
+        Err(ended) => return ended,
+    };
+    assert_eq!(client.ask("go"), "more than one panel is served; name one of: left, right");
+    assert_eq!(client.answer(), "[1, 1]");
+    assert!(desk.capture_monitor(&left) == flat(10, &left));
+    assert!(desk.capture_monitor(&right) == flat(20, &right));
+    let told = client.answer();
+    assert!(told.starts_with("no panel is served at") && told.contains("middle.sock"), "{told}");
+    assert_eq!(client.answer(), "this SLM is closed");
+    client.end();
+    Ended::Passed
+}
+
+/// A program that ends with the test.
+struct Killed(Child);
+
+impl Drop for Killed {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
 }
 
 fn trigger(desk: &Desk) -> Ended {
