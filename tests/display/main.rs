@@ -13,6 +13,8 @@ mod frames;
 mod monitors;
 mod ownership;
 mod pixels;
+#[cfg(unix)]
+mod python;
 mod server;
 #[cfg(unix)]
 mod serving;
@@ -50,6 +52,8 @@ fn main() -> ExitCode {
         timing::CASES,
         #[cfg(unix)]
         serving::CASES,
+        #[cfg(unix)]
+        python::CASES,
         window_manager::CASES,
         #[cfg(unix)]
         wayland::CASES,
