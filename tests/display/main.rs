@@ -14,6 +14,8 @@ mod live;
 mod monitors;
 mod ownership;
 mod pixels;
+#[cfg(unix)]
+mod python;
 mod sequences;
 mod server;
 #[cfg(unix)]
@@ -54,6 +56,8 @@ fn main() -> ExitCode {
         live::CASES,
         #[cfg(unix)]
         serving::CASES,
+        #[cfg(unix)]
+        python::CASES,
         window_manager::CASES,
         #[cfg(unix)]
         wayland::CASES,
