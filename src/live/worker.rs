@@ -235,7 +235,7 @@ impl Job {
                     }
                 }
                 done = version;
-                for detail in Detail::ALL {
+                for detail in self.levels() {
                     match self.compute(detail, (&wish, version, since), (&loaded, &bvh), &mut lights, &running) {
                         Ok(refined) => self.tell(Happened::Refined(Box::new(refined))),
                         Err(Error::Interrupted) => {
@@ -316,6 +316,17 @@ impl Job {
             encode_seconds: begin.elapsed().as_secs_f64(),
             seconds: since.elapsed().as_secs_f64(),
         })
+    }
+
+    /// The levels that are worth their time: each has clearly more rays than the one before.
+    fn levels(&self) -> Vec<Detail> {
+        let rays = f64::from(self.scene.trace.width.max(self.scene.trace.height));
+        let worth = |detail: &Detail| match detail {
+            Detail::Coarse => rays > COARSE_RAYS,
+            Detail::Middle => MIDDLE_SHARE * rays > 1.5 * COARSE_RAYS,
+            Detail::Full => true,
+        };
+        Detail::ALL.into_iter().filter(worth).collect()
     }
 
     /// The settings of a level.
