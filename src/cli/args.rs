@@ -410,6 +410,10 @@ pub(crate) struct ShowArgs {
     /// Show the frame even where a gamma table (night light) alters its levels; the report says what does.
     #[arg(long)]
     pub(crate) allow_altered_levels: bool,
+    /// A square of SIZE video pixels in a corner (top-left, top-right, bottom-left, bottom-right) that toggles between black
+    /// and white with every frame, for a photodiode.
+    #[arg(long, value_name = "CORNER,SIZE", requires = "monitor")]
+    pub(crate) trigger_patch: Option<String>,
     /// Encode so many sub-frames with phases of their own; shown faster than an eye sees, their speckle averages out.
     #[arg(long, default_value_t = 1, value_name = "N", conflicts_with = "wavelengths")]
     pub(crate) subframes: usize,

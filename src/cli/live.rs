@@ -74,7 +74,7 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
     // The panel is taken with all levels at zero, before anything is computed.
     let levels = vec![0; panel.profile.width * panel.profile.height];
     let idle = Frame::new(&panel.profile, panel.wavelength, levels)?;
-    let settings = WindowSettings { take_keyboard: home.is_none(), ..window(args) };
+    let settings = WindowSettings { take_keyboard: home.is_none(), ..window(args)? };
     let window = PanelWindow::open(&mut display, &choice, &Arc::new(packed(&[&idle])?), &settings)?;
     report.warn(window.warnings());
     let operator = home.map(|home| open_operator(&mut display, &home, &monitor)).transpose()?;

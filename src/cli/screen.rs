@@ -80,7 +80,7 @@ impl Screen {
         // A sequence ends with its last frame, unless it is told to keep that.
         let settings = PlaySettings {
             monitor: self.choice.clone(),
-            window: window(args),
+            window: window(args)?,
             rate,
             hold: Some(hold(args)?.unwrap_or_default()),
             ahead: match args.sequence.ahead {
@@ -153,7 +153,7 @@ impl Screen {
         let picture = packed(frames)?;
         let settings = ShowSettings {
             monitor: self.choice.clone(),
-            window: window(args),
+            window: window(args)?,
             hold: hold(args)?,
             on_absence: on_absence(args),
         };
@@ -190,13 +190,14 @@ pub(super) fn hold(args: &ShowArgs) -> Result<Option<Duration>> {
     }
 }
 
-pub(super) fn window(args: &ShowArgs) -> WindowSettings {
+pub(super) fn window(args: &ShowArgs) -> Result<WindowSettings> {
     let presenter = match args.present {
         PresenterArg::Auto => Presenter::Auto,
         PresenterArg::Gpu => Presenter::Gpu,
         PresenterArg::Software => Presenter::Software,
     };
-    WindowSettings { presenter, exact: !args.allow_altered_levels, ..WindowSettings::default() }
+    let trigger = args.trigger_patch.as_deref().map(str::parse).transpose()?;
+    Ok(WindowSettings { presenter, exact: !args.allow_altered_levels, trigger, ..WindowSettings::default() })
 }
 
 /// Whether the show ends with the monitor.

@@ -34,13 +34,21 @@ pub(crate) fn numbered_frames(folder: &Path, count: u64) {
 
 /// The numbers that are seen on the panel, each once, until the program has ended or `enough` are there.
 fn numbers_seen(desk: &Desk, running: &mut Child, enough: usize) -> Vec<u64> {
+    marks_seen(desk, running, enough).into_iter().map(|(number, _)| number).collect()
+}
+
+/// The same with the level of the upper right corner beside each number.
+fn marks_seen(desk: &Desk, running: &mut Child, enough: usize) -> Vec<(u64, u8)> {
     let plug = desk.plug(PANEL);
-    let mut seen: Vec<u64> = Vec::new();
+    let mut seen: Vec<(u64, u8)> = Vec::new();
+    let corner = |desk: &Desk| desk.capture(plug.x + plug.width as i16 - 1, plug.y, 1, 1).pixels[0][0];
     desk.wait_until("the sequence ends", || {
         // The last row comes last where a frame is drawn from the top.
-        let corner = desk.capture(plug.x, plug.y + plug.height as i16 - 1, NUMBER_BITS as u16, 1);
-        if let Some(number) = corner.number().filter(|number| seen.last() != Some(number)) {
-            seen.push(number);
+        let number =
+            |desk: &Desk| desk.capture(plug.x, plug.y + plug.height as i16 - 1, NUMBER_BITS as u16, 1).number();
+        let (before, mark, after) = (number(desk), corner(desk), number(desk));
+        if let Some(number) = before.filter(|_| before == after).filter(|&n| seen.last().is_none_or(|(m, _)| *m != n)) {
+            seen.push((number, mark));
         }
         seen.len() >= enough || running.try_wait().expect("child").is_some()
     });
@@ -78,9 +86,16 @@ fn folder(desk: &Desk) -> Ended {
         "slow.toml",
         "--events",
         "events.jsonl",
+        "--trigger-patch",
+        "top-right,24",
     ];
     let mut running = program(desk, folder.path(), &arguments).stdout(Stdio::piped()).spawn().expect("runs");
-    let seen = numbers_seen(desk, &mut running, usize::MAX);
+    let marks = marks_seen(desk, &mut running, usize::MAX);
+    let seen: Vec<u64> = marks.iter().map(|(number, _)| *number).collect();
+    // The corner toggles with every frame. The first number may be of the empty desktop.
+    for pair in marks[1..COUNT as usize].windows(2) {
+        assert!(pair[0].1.abs_diff(pair[1].1) == 255, "the corner does not toggle: {marks:?}");
+    }
     let report = report(running);
     // An empty desktop is black, which reads as 0, as the first frame does; f10 comes after f9.
     assert_eq!(seen.iter().copied().take(COUNT as usize).collect::<Vec<_>>(), (0..COUNT).collect::<Vec<_>>());
