@@ -31,15 +31,15 @@ impl Seen {
             let settings = PreviewSettings { wavelength: Some(wavelength), ..settings.clone() };
             preview(folder, &settings, progress)
         };
-        match lamps {
-            &[a, b, c] => {
+        match *lamps {
+            [a, b, c] => {
                 let lasers = Lasers::new([a, b, c])?;
                 let [red, green, blue] = lasers.wavelengths();
                 let [red, green, blue] = [lit(red)?, lit(green)?, lit(blue)?];
                 let channels = [red.picture.clone(), green.picture, blue.picture];
                 Ok(Self::Color(red, ColorPicture::combine(&lasers, &channels)))
             }
-            &[one] => lit(one).map(Self::Gray),
+            [one] => lit(one).map(Self::Gray),
             _ => Err(Error::parameter("wavelength", "the plate names none")),
         }
     }
