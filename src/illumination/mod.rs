@@ -84,6 +84,21 @@ pub struct IlluminationSettings {
     pub seed: u64,
 }
 
+impl IlluminationSettings {
+    /// The same with rougher light, without caustics, for a first look.
+    pub fn coarse(self) -> Self {
+        Self {
+            residual: 1e-2,
+            indirect_rays: 32,
+            photons: 0,
+            final_gather: None,
+            longest_element: 0.2,
+            shortest_element: 0.1,
+            ..self
+        }
+    }
+}
+
 impl Default for IlluminationSettings {
     fn default() -> Self {
         Self {

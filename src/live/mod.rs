@@ -6,6 +6,7 @@
 //! cannot be read is told, and the last good scene stays. [`Watch`] sees files change. A [`Viewer`] reconstructs what an eye
 //! sees of the newest hologram, and [`draw`] puts the operator's view together.
 
+mod background;
 mod view;
 mod viewer;
 mod watch;

@@ -1,5 +1,6 @@
 //! What an eye sees of the newest hologram, reconstructed on a thread of its own.
 
+use super::background::{Background, Desk};
 use super::worker::{Detail, Refined};
 use crate::error::{Error, Result};
 use crate::field::Field;
@@ -9,9 +10,8 @@ use crate::pipeline;
 use crate::points::placement::Placing;
 use crate::progress::Progress;
 use crate::reconstruction::{self, Picture, View, ViewSettings};
-use std::sync::mpsc::{Receiver, Sender, TryRecvError};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
 use std::time::Instant;
 
 /// From where and at what depth the operator looks.
@@ -83,39 +83,21 @@ fn of_light(
     reconstruction::picture(field, &look.view(placing), half, size, &settings, progress)
 }
 
-struct Order {
-    wanted: Option<(Arc<Refined>, Look)>,
-    end: bool,
-    running: Arc<Progress>,
-}
-
-type Orders = Arc<(Mutex<Order>, Condvar)>;
+/// What is to be looked at next.
+type Order = Option<(Arc<Refined>, Look)>;
 
 /// Reconstructs what was last asked for; ends when it is dropped.
-pub struct Viewer {
-    orders: Orders,
-    seen: Receiver<Result<Seen>>,
-    thread: Option<JoinHandle<()>>,
-}
+pub struct Viewer(Background<Order, Result<Seen>>);
 
 impl Viewer {
     /// A viewer whose pictures have this size (columns, rows) [px].
     pub fn start(size: (usize, usize)) -> Self {
-        let (tell, seen) = std::sync::mpsc::channel();
-        let order = Order { wanted: None, end: false, running: Arc::default() };
-        let orders: Orders = Arc::new((Mutex::new(order), Condvar::new()));
-        let shared = Arc::clone(&orders);
-        let thread = std::thread::spawn(move || work(&shared, size, &tell));
-        Self { orders, seen, thread: Some(thread) }
+        Self(Background::start(None, move |desk, tell| work(desk, size, tell)))
     }
 
     /// Asks for a picture of this hologram; one that is being made is given up.
     pub fn ask(&self, hologram: &Arc<Refined>, look: Look) {
-        let (lock, changed) = &*self.orders;
-        let mut order = held(lock);
-        order.wanted = Some((Arc::clone(hologram), look));
-        order.running.stop();
-        changed.notify_all();
+        self.0.ask(|order| *order = Some((Arc::clone(hologram), look)));
     }
 
     /// A picture, or what was wrong, since the last call.
@@ -123,51 +105,14 @@ impl Viewer {
     /// # Errors
     /// Those of [`reconstruct`].
     pub fn poll(&self) -> Result<Option<Seen>> {
-        match self.seen.try_recv() {
-            Ok(seen) => seen.map(Some),
-            Err(TryRecvError::Empty) => Ok(None),
-            Err(TryRecvError::Disconnected) => Err(Error::unsupported("the reconstruction has ended unexpectedly")),
-        }
+        self.0.poll("the reconstruction")?.transpose()
     }
 }
 
-impl Drop for Viewer {
-    fn drop(&mut self) {
-        {
-            let (lock, changed) = &*self.orders;
-            let mut order = held(lock);
-            order.end = true;
-            order.running.stop();
-            changed.notify_all();
-        }
-        if let Some(thread) = self.thread.take() {
-            // One that has panicked has said so.
-            let _ = thread.join();
-        }
-    }
-}
-
-fn held(lock: &Mutex<Order>) -> MutexGuard<'_, Order> {
-    lock.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-fn work((lock, changed): &(Mutex<Order>, Condvar), size: (usize, usize), tell: &Sender<Result<Seen>>) {
+fn work(desk: &Desk<Order>, size: (usize, usize), tell: &Sender<Result<Seen>>) {
     // The light of one hologram serves all looks at it.
     let mut light: Option<((u64, Detail), (Field, ViewSettings))> = None;
-    loop {
-        let (hologram, look, running) = {
-            let mut order = held(lock);
-            loop {
-                if order.end {
-                    return;
-                }
-                if let Some((hologram, look)) = order.wanted.take() {
-                    order.running = Arc::default();
-                    break (hologram, look, Arc::clone(&order.running));
-                }
-                order = changed.wait(order).unwrap_or_else(PoisonError::into_inner);
-            }
-        };
+    while let Some(((hologram, look), running)) = desk.next(Option::take) {
         let begin = Instant::now();
         let known = (hologram.version, hologram.detail);
         let made = (|| {

@@ -1,9 +1,10 @@
 //! The thread that computes what was last wished for.
 
+use super::background::{Background, Desk};
 use crate::encode::{EncodeSettings, Encoding};
 use crate::error::{Error, Result};
 use crate::hologram::{HologramReport, HologramSettings};
-use crate::illumination::{Illumination, IlluminationSettings};
+use crate::illumination::Illumination;
 use crate::panel::{Frame, PanelProfile};
 use crate::pipeline::{self, Lit, SceneSettings};
 use crate::points::Channel;
@@ -13,9 +14,8 @@ use crate::scene::{Camera, SceneBvh, gltf};
 use glam::{DMat4, DVec3};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, Sender, TryRecvError};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
 use std::time::Instant;
 
 /// Rays across or down of the coarse level, on the longer side.
@@ -98,25 +98,17 @@ pub enum Happened {
     Cancelled(f64),
 }
 
-/// What the worker is to do, shared with it.
+/// What the worker is to do.
 struct Order {
     wish: Wish,
     version: u64,
     since: Instant,
     /// Whether the file is to be read again.
     reload: bool,
-    end: bool,
-    running: Arc<Progress>,
 }
-
-type Orders = Arc<(Mutex<Order>, Condvar)>;
 
 /// Computes on a thread of its own; ends when it is dropped.
-pub struct Worker {
-    orders: Orders,
-    happened: Receiver<Happened>,
-    thread: Option<JoinHandle<()>>,
-}
+pub struct Worker(Background<Order, Happened>);
 
 /// What does not change while it runs.
 struct Job {
@@ -125,7 +117,6 @@ struct Job {
     profile: PanelProfile,
     channel: Channel,
     hologram: HologramSettings,
-    tell: Sender<Happened>,
 }
 
 impl Worker {
@@ -144,27 +135,20 @@ impl Worker {
         let mut file = gltf::File::open(path)?;
         let files = file.files();
         let first = file.pose(&scene.load)?;
-        let (tell, happened) = std::sync::mpsc::channel();
-        let running = Arc::new(Progress::new());
-        let order = Order { wish, version: 1, since: Instant::now(), reload: false, end: false, running };
-        let orders: Orders = Arc::new((Mutex::new(order), Condvar::new()));
-        let job = Job { path: path.into(), scene, profile, channel, hologram, tell };
-        let shared = Arc::clone(&orders);
-        let thread = std::thread::spawn(move || job.work(first, &shared));
-        Ok((Self { orders, happened, thread: Some(thread) }, files))
+        let order = Order { wish, version: 1, since: Instant::now(), reload: false };
+        let job = Job { path: path.into(), scene, profile, channel, hologram };
+        Ok((Self(Background::start(order, move |desk, tell| job.work(first, desk, tell))), files))
     }
 
     /// Wishes for something else; `reload` reads the file again. What is running is stopped. The number of the wish.
     pub fn wish(&self, wish: Wish, reload: bool) -> u64 {
-        let (lock, changed) = &*self.orders;
-        let mut order = held(lock);
-        order.wish = wish;
-        order.version += 1;
-        order.since = Instant::now();
-        order.reload |= reload;
-        order.running.stop();
-        changed.notify_all();
-        order.version
+        self.0.ask(|order| {
+            order.wish = wish;
+            order.version += 1;
+            order.since = Instant::now();
+            order.reload |= reload;
+            order.version
+        })
     }
 
     /// What has happened since the last call, one thing at a time.
@@ -172,38 +156,14 @@ impl Worker {
     /// # Errors
     /// [`Error::Unsupported`] when the worker's thread has come to an unforeseen end.
     pub fn poll(&self) -> Result<Option<Happened>> {
-        match self.happened.try_recv() {
-            Ok(happened) => Ok(Some(happened)),
-            Err(TryRecvError::Empty) => Ok(None),
-            Err(TryRecvError::Disconnected) => Err(Error::unsupported("the computation has ended unexpectedly")),
-        }
+        self.0.poll("the computation")
     }
-}
-
-impl Drop for Worker {
-    fn drop(&mut self) {
-        {
-            let (lock, changed) = &*self.orders;
-            let mut order = held(lock);
-            order.end = true;
-            order.running.stop();
-            changed.notify_all();
-        }
-        if let Some(thread) = self.thread.take() {
-            // One that has panicked has said so.
-            let _ = thread.join();
-        }
-    }
-}
-
-/// The order, whatever a panic of the other side has left: it is whole at any time.
-fn held(lock: &Mutex<Order>) -> MutexGuard<'_, Order> {
-    lock.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Job {
-    fn work(&self, first: gltf::Loaded, orders: &Orders) {
-        let (lock, changed) = &**orders;
+    fn work(&self, first: gltf::Loaded, desk: &Desk<Order>, told: &Sender<Happened>) {
+        // Where whoever asked has gone, the next look at the order ends the thread.
+        let tell = |happened| drop(told.send(happened));
         let mut loaded = first;
         let mut done = 0;
         // The light of one scene borrows the scene: another scene begins the loop again.
@@ -211,51 +171,39 @@ impl Job {
             let bvh = SceneBvh::new(&loaded.scene);
             let mut lights: [Option<Illumination>; 2] = [None, None];
             loop {
-                let (wish, version, since, reload, running) = {
-                    let mut order = held(lock);
-                    while order.version == done && !order.end {
-                        order = changed.wait(order).unwrap_or_else(PoisonError::into_inner);
-                    }
-                    if order.end {
-                        return;
-                    }
-                    order.running = Arc::new(Progress::new());
-                    let reload = std::mem::take(&mut order.reload);
-                    (order.wish.clone(), order.version, order.since, reload, Arc::clone(&order.running))
-                };
+                let next = desk.next(|order| {
+                    let new = order.version != done;
+                    new.then(|| (order.wish.clone(), order.version, order.since, std::mem::take(&mut order.reload)))
+                });
+                let Some(((wish, version, since, reload), running)) = next else { return };
                 if reload {
                     match self.load() {
                         Ok((files, next)) => {
-                            self.tell(Happened::Loaded(files));
+                            tell(Happened::Loaded(files));
                             drop(lights);
                             loaded = next;
                             continue 'scenes;
                         }
-                        Err(error) => self.tell(Happened::Failed(error.to_string())),
+                        Err(error) => tell(Happened::Failed(error.to_string())),
                     }
                 }
                 done = version;
                 for detail in self.levels() {
                     match self.compute(detail, (&wish, version, since), (&loaded, &bvh), &mut lights, &running) {
-                        Ok(refined) => self.tell(Happened::Refined(Box::new(refined))),
+                        Ok(refined) => tell(Happened::Refined(Box::new(refined))),
                         Err(Error::Interrupted) => {
-                            let since = held(lock).since;
-                            self.tell(Happened::Cancelled(since.elapsed().as_secs_f64()));
+                            let since = desk.look(|order| order.since);
+                            tell(Happened::Cancelled(since.elapsed().as_secs_f64()));
                             break;
                         }
                         Err(error) => {
-                            self.tell(Happened::Failed(error.to_string()));
+                            tell(Happened::Failed(error.to_string()));
                             break;
                         }
                     }
                 }
             }
         }
-    }
-
-    fn tell(&self, happened: Happened) {
-        // Whoever asked has gone: the next look at the order ends the thread.
-        let _ = self.tell.send(happened);
     }
 
     fn load(&self) -> Result<(Vec<PathBuf>, gltf::Loaded)> {
@@ -343,15 +291,7 @@ impl Job {
         settings.points = None;
         settings.trace = TraceSettings { width: w, height: h, edge_rays: 1, ..*trace };
         if detail == Detail::Coarse {
-            settings.illumination = IlluminationSettings {
-                residual: 1e-2,
-                indirect_rays: 32,
-                photons: 0,
-                final_gather: None,
-                longest_element: 0.2,
-                shortest_element: 0.1,
-                ..settings.illumination
-            };
+            settings.illumination = settings.illumination.coarse();
         }
         settings
     }

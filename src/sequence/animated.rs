@@ -10,7 +10,7 @@ use crate::encode::{EncodeSettings, Encoded};
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::hologram::{self, Computed, HologramSettings};
-use crate::illumination::{Illumination, IlluminationSettings};
+use crate::illumination::Illumination;
 use crate::panel::PanelProfile;
 use crate::pipeline::{self, Lit, SceneSettings};
 use crate::points::Channel;
@@ -145,15 +145,7 @@ impl Animation {
         let settings = &self.scene;
         let camera = first_camera(&self.path, &loaded.scene)?;
         let bvh = SceneBvh::new(&loaded.scene);
-        let coarse = IlluminationSettings {
-            residual: 1e-2,
-            indirect_rays: 32,
-            photons: 0,
-            final_gather: None,
-            longest_element: 0.2,
-            shortest_element: 0.1,
-            ..settings.illumination
-        };
+        let coarse = settings.illumination.coarse();
         let light = Illumination::new(&bvh, coarse, progress)?;
         let (width, height) = (f64::from(settings.trace.width), f64::from(settings.trace.height));
         let scale = (LOOK_RAYS / width.max(height)).min(1.0);
