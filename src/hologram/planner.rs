@@ -96,6 +96,9 @@ impl Job<'_> {
             Some(Shape { kernel: Kernel::Integer, width, height, .. }) => {
                 format!("tiles of {width}×{height} px in 16-bit integers")
             }
+            Some(Shape { kernel: Kernel::Bfloat, width, height, .. }) => {
+                format!("tiles of {width}×{height} px in bfloat16")
+            }
             None => "points near the panel as products of kernels".to_owned(),
         };
         let factor = set_factor(self.settings, method);
@@ -215,7 +218,7 @@ const FIELD_PIXEL: f64 = 3.5e-9;
 /// Slowness against AVX-512, measured.
 fn set_factor(settings: &HologramSettings, method: Method) -> f64 {
     match (settings.instruction_set.unwrap_or_else(InstructionSet::detect), method) {
-        (InstructionSet::Avx512Vnni | InstructionSet::Avx512, _)
+        (InstructionSet::Amx | InstructionSet::Avx512Vnni | InstructionSet::Avx512, _)
         | (_, Method::Oracle | Method::Gpu | Method::GpuPlanes) => 1.0,
         (InstructionSet::Avx2, _) => 1.3,
         (InstructionSet::Portable, Method::Direct | Method::Recurrence) => 5.5,

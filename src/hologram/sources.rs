@@ -70,8 +70,7 @@ const PART: usize = 4096;
 
 /// Checks points and leaves out those of amplitude zero; refuses what is not finite, naming the point.
 pub(crate) fn sources(points: &[PointSource]) -> Result<Vec<Source>> {
-    let mut sources = Vec::with_capacity(points.len());
-    for (i, p) in points.iter().enumerate() {
+    let one = |(i, p): (usize, &PointSource)| {
         if !(p.position.is_finite() && p.amplitude.is_finite() && p.phase.is_finite()) {
             let what = format!(
                 "point {i}: position {} m, amplitude {}, phase {} rad must be finite numbers",
@@ -79,17 +78,27 @@ pub(crate) fn sources(points: &[PointSource]) -> Result<Vec<Source>> {
             );
             return Err(Error::parameter("points", what));
         }
-        if p.amplitude == 0.0 {
-            continue;
-        }
-        sources.push(Source {
+        let source = Source {
             x: p.position.x,
             y: p.position.y,
             distance: p.position.z.abs(),
             sign: if p.position.z > 0.0 { -1.0 } else { 1.0 },
             amplitude: f64::from(p.amplitude),
             turns: (p.phase / std::f64::consts::TAU).rem_euclid(1.0),
-        });
+        };
+        Ok((p.amplitude != 0.0).then_some(source))
+    };
+    // Parts keep their order, so the first bad point is the one that is named.
+    let parts: Vec<Result<Vec<Source>>> = points
+        .par_chunks(PART)
+        .enumerate()
+        .map(|(part, points)| {
+            points.iter().enumerate().filter_map(|(i, p)| one((part * PART + i, p)).transpose()).collect()
+        })
+        .collect();
+    let mut sources = Vec::with_capacity(points.len());
+    for part in parts {
+        sources.append(&mut part?);
     }
     Ok(sources)
 }

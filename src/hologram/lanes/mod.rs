@@ -5,6 +5,8 @@
 //! the portable one rounds between multiplication and addition, so results differ between instruction sets by
 //! rounding; on one of them they are the same bits for any number of threads.
 
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod matrix;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -16,6 +18,8 @@ pub(crate) use x86::{Avx2, Avx512};
 /// An instruction set that the kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstructionSet {
+    /// AVX-512 as below and a matrix unit for bfloat16 (AMX).
+    Amx,
     /// AVX-512 F, DQ, BW, VL and VNNI: 16 lanes, and products of 16-bit integers.
     Avx512Vnni,
     /// AVX-512 F, DQ and VL: 16 lanes.
@@ -42,6 +46,9 @@ impl InstructionSet {
                 && is_x86_feature_detected!("avx512vl");
             if fma && wide {
                 if is_x86_feature_detected!("avx512bw") && is_x86_feature_detected!("avx512vnni") {
+                    if matrix::Amx::is_present() {
+                        sets.push(Self::Amx);
+                    }
                     sets.push(Self::Avx512Vnni);
                 }
                 sets.push(Self::Avx512);
@@ -56,6 +63,7 @@ impl InstructionSet {
     /// Its name.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Amx => "AVX-512 AMX",
             Self::Avx512Vnni => "AVX-512 VNNI",
             Self::Avx512 => "AVX-512",
             Self::Avx2 => "AVX2",
@@ -175,9 +183,9 @@ macro_rules! dispatch {
         }
         match $set {
             #[cfg(target_arch = "x86_64")]
-            $crate::hologram::lanes::InstructionSet::Avx512Vnni | $crate::hologram::lanes::InstructionSet::Avx512 => {
-                avx512($($name),*)
-            }
+            $crate::hologram::lanes::InstructionSet::Amx
+            | $crate::hologram::lanes::InstructionSet::Avx512Vnni
+            | $crate::hologram::lanes::InstructionSet::Avx512 => avx512($($name),*),
             #[cfg(target_arch = "x86_64")]
             $crate::hologram::lanes::InstructionSet::Avx2 => avx2($($name),*),
             _ => $kernel::<$crate::hologram::lanes::Portable>($($name),*),

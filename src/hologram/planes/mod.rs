@@ -11,6 +11,7 @@
 //! Error model, against the definition: e₁ = 0.035·(h/λ)·sin⁴θ_max for R = 1 and e₁^R·(1, 0.57, 0.18 …) beyond, the
 //! kernels' cut tails, and the table's interpolation; [`Parameters::error`].
 
+mod cost;
 mod paint;
 mod slabs;
 mod spectrum;
@@ -22,7 +23,7 @@ use super::sources::{Source, tilt};
 use crate::error::Result;
 use crate::field::{Complex32, Field, Grid, zeroed};
 use crate::progress::Progress;
-use paint::{Brush, Canvas, paint};
+use paint::{Brush, Canvas, Patches, paint};
 use rayon::prelude::*;
 use slabs::Depths;
 use spectrum::Spectrum;
@@ -83,21 +84,24 @@ impl Cloud {
             })
         };
         let sources: Vec<Source> = sources.par_iter().filter(|s| meets(s)).copied().collect();
-        let none = [f64::INFINITY, f64::NEG_INFINITY];
-        let mut places = [none; 2];
         let pixels = [grid.width as f64, grid.height as f64];
-        let mut period = pixels;
-        for s in &sources {
-            for (axis, at) in [grid.column(s.x), grid.row(s.y)].into_iter().enumerate() {
-                places[axis] = [places[axis][0].min(at), places[axis][1].max(at)];
+        // Lowest and highest place, and period, of each axis: whatever the order, the same.
+        let one = |s: &Source| {
+            let at = [grid.column(s.x), grid.row(s.y)];
+            [0, 1].map(|axis| {
                 // An alias, one period away, must lie beyond the point's reach from the farthest pixel.
-                let farthest = at.abs().max((pixels[axis] - 1.0 - at).abs());
-                period[axis] = period[axis].max(farthest + reach(optics, axis, s.distance) / optics.pitch[axis]);
-            }
-        }
+                let farthest = at[axis].abs().max((pixels[axis] - 1.0 - at[axis]).abs());
+                [at[axis], at[axis], farthest + reach(optics, axis, s.distance) / optics.pitch[axis]]
+            })
+        };
+        let none = pixels.map(|pixels| [f64::INFINITY, f64::NEG_INFINITY, pixels]);
+        let wider = |a: [f64; 3], b: [f64; 3]| [a[0].min(b[0]), a[1].max(b[1]), a[2].max(b[2])];
+        let axes = sources.par_iter().map(one).reduce(|| none, |a, b| [wider(a[0], b[0]), wider(a[1], b[1])]);
+        let places = axes.map(|[low, high, _]| [low, high]);
+        let period = axes.map(|[_, _, period]| period);
         let limit = optics.taper.map(|taper| optics.wavelength * taper.limit);
         let steepness = (tilt(&sources, grid, limit) / (limit[0] * limit[1] / 3.0)).max(1.0);
-        let depths = Depths::new(sources.iter().map(|s| (s.sign * s.distance, s.amplitude)));
+        let depths = Depths::new(&sources, |s| (s.sign * s.distance, s.amplitude));
         Self { sources, depths, places, period, steepness }
     }
 }
@@ -161,79 +165,7 @@ impl Parameters {
         }
         best
     }
-    /// Predicted work on the widest instruction set [core-seconds].
-    fn core_seconds(&self, optics: &Optics, grid: &Grid, cloud: &Cloud, slabs: &Slabs) -> f64 {
-        if cloud.sources.is_empty() {
-            return 0.0;
-        }
-        let layout = layout(optics, grid, cloud, self, slabs);
-        let planes = slabs.depths.len() as f64;
-        let passes = planes * self.rank as f64;
-        let [width, height] = layout.size.map(|size| size as f64);
-        let count = cloud.sources.len() as f64;
-        // Mean area of a kernel: depths are even over the slab, so widths are even from the tail to tail + cone; a
-        // group's union, and whole vectors, are some pixels more.
-        let cone = [0, 1].map(|axis| optics.cone(axis, slabs.half) / optics.pitch[axis]);
-        let tail = 2.0 * self.tail + 20.0;
-        let area = (tail + cone[0]) * (tail + cone[1]) + cone[0] * cone[1] / 3.0;
-        // Patches: a bin and the kernels' reach around it, of the bins that have points.
-        let half = [0, 1].map(|axis| Table::half_width(optics, axis, slabs.half, self.tail));
-        let bin = paint::bin(half, self.rank) as f64;
-        let patch = half.iter().map(|half| bin + 2.0 * *half as f64).product::<f64>();
-        let bins: f64 = cloud.places.iter().map(|[low, high]| ((high - low) / bin).max(1.0)).product();
-        let patches = planes * bins * (1.0 - (-count / (planes * bins)).exp());
-        let axes = if optics.pitch[0] == optics.pitch[1] { 0..1 } else { 0..2 };
-        let tables: u64 = axes.map(|axis| Table::bytes(optics, axis, slabs.half, self.tail, self.table)).sum();
-        // The larger the transforms, the less of them stays in caches.
-        let caches = (width * height / 7e6).max(1.0).powf(0.3);
-        let spectra = passes * width * (COLUMN * height + ROW * layout.painted as f64)
-            + width * (BACK_COLUMN * height + BACK_ROW * grid.height as f64)
-            + WINDOW * grid.len() as f64;
-        let dabs =
-            count * (DAB + DAB_PIXEL * self.rank as f64 * area) + PATCH_PIXEL * patches * self.rank as f64 * patch;
-        caches * spectra + dabs + TABLE_BYTE * tables as f64
-    }
-    /// Memory beside points and field [bytes].
-    fn bytes(&self, optics: &Optics, grid: &Grid, cloud: &Cloud, slabs: &Slabs) -> u64 {
-        if cloud.sources.is_empty() {
-            return 0;
-        }
-        let layout = layout(optics, grid, cloud, self, slabs);
-        let h = slabs.half;
-        let plane = (self.rank * layout.size[0] * layout.painted * 8) as u64;
-        let half = [0, 1].map(|axis| Table::half_width(optics, axis, h, self.tail));
-        let axes = if optics.pitch[0] == optics.pitch[1] { 0..1 } else { 0..2 };
-        let tables: u64 = axes.map(|axis| Table::bytes(optics, axis, h, self.tail, self.table)).sum();
-        let points = cloud.sources.len() as u64 * (size_of::<Source>() + size_of::<Dab>() + paint::ORDER_BYTES) as u64;
-        plane + Spectrum::bytes(&layout, self.rank) + paint::bytes(half, self.rank) + tables + points
-    }
 }
-
-// Core-seconds on AVX-512, fitted to 44 runs of 1e3 to 1e6 points on 0.5 to 33 Mpx on a 3.7 GHz Zen 4: all within 27 %
-// but one, the mean square 12 %.
-
-/// A pixel's part in a column's transform and in the factors of a pass.
-const COLUMN: f64 = 2.5e-9;
-
-/// A pixel of a painted row: clearing and transform.
-const ROW: f64 = 3.1e-9;
-
-/// A pixel on the way back: its part in a column's, and in a row's transform.
-const BACK_COLUMN: f64 = 4.8e-9;
-const BACK_ROW: f64 = 3.5e-9;
-
-/// A pixel of the panel.
-const WINDOW: f64 = 8e-9;
-
-/// A point, and a pixel of its kernel.
-const DAB: f64 = 0.7e-6;
-const DAB_PIXEL: f64 = 1.6e-10;
-
-/// A pixel of a patch: cleared and added to the plane.
-const PATCH_PIXEL: f64 = 1.6e-9;
-
-/// A byte of the kernels' tables.
-const TABLE_BYTE: f64 = 2e-9;
 
 /// Error of kernels cut `tail` pixels beyond a cone of `cone` pixels: the taper's transform, exp(−(0.0895·px)²), times
 /// a power, fitted to measured errors at tails of 10 to 22 px and cones of 2 to 124 px.
@@ -359,11 +291,12 @@ pub(crate) fn field(
     let samples = layout.size[0] * layout.painted;
     let mut moments: Vec<Vec<Complex32>> = (0..parameters.rank).map(|_| zeroed(samples)).collect();
     let mut spectrum = Spectrum::new(optics, &layout, h, set);
+    let mut patches = Patches::default();
+    let planes: Vec<u8> = sources.par_iter().map(|s| slabs.index(s.sign * s.distance) as u8).collect();
     for k in 0..slabs.depths.len() {
         let middle = slabs.plane(k);
-        let is_here = |s: &&Source| slabs.index(s.sign * s.distance) == k;
-        let dabs: Vec<Dab> =
-            sources.par_iter().filter(is_here).map(|s| dab(optics, grid, &layout, carrier, s, middle)).collect();
+        let here = planes.par_iter().zip(sources).filter(|(plane, _)| usize::from(**plane) == k);
+        let dabs: Vec<Dab> = here.map(|(_, s)| dab(optics, grid, &layout, carrier, s, middle)).collect();
         for moment in &mut moments {
             moment.par_chunks_mut(1 << 16).for_each(|part| {
                 if !progress.stopped() {
@@ -372,7 +305,7 @@ pub(crate) fn field(
             });
         }
         let mut canvas = Canvas { width: layout.size[0], moments: &mut moments };
-        paint(&mut canvas, &brush, &dabs, set, progress)?;
+        paint(&mut canvas, &brush, &dabs, &mut patches, set, progress)?;
         spectrum.add(middle, &mut moments, progress)?;
     }
     spectrum.finish(grid, progress)

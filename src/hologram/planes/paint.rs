@@ -12,10 +12,10 @@ use crate::progress::Progress;
 use rayon::prelude::*;
 
 /// Points painted together: a patch's row is loaded and stored once for all of them.
-const GROUP: usize = 3;
+pub(super) const GROUP: usize = 3;
 
 /// Cells of dabs that are painted one after another [px].
-const CELL: usize = 16;
+pub(super) const CELL: usize = 16;
 
 /// Side of a bin for kernels of the given half sizes [px]: a patch is the bin and the kernels' reach around it, and what
 /// of it is reach is painted, cleared and added more than once. Larger bins have less of that, as long as the patch
@@ -30,7 +30,7 @@ pub(super) fn bin(half: [usize; 2], rank: usize) -> usize {
 const LARGEST: usize = 4096;
 
 /// Patches that are painted before they are added.
-const WAVE: usize = 64;
+pub(super) const WAVE: usize = 64;
 
 /// Rows that one task adds to.
 const BAND: usize = 16;
@@ -70,6 +70,10 @@ pub(super) struct Canvas<'a> {
     pub(super) moments: &'a mut [Vec<Complex32>],
 }
 
+/// Patches of a wave; kept from plane to plane, since memory that was not touched before is slow.
+#[derive(Debug, Default)]
+pub(super) struct Patches(Vec<Patch>);
+
 #[derive(Debug, Default)]
 struct Patch {
     first: [usize; 2],
@@ -95,12 +99,12 @@ pub(super) fn paint(
     canvas: &mut Canvas,
     brush: &Brush,
     dabs: &[Dab],
+    Patches(patches): &mut Patches,
     set: InstructionSet,
     progress: &Progress,
 ) -> Result<()> {
     let bins = bins(dabs, canvas.width, brush.bin);
-    let mut patches: Vec<Patch> = Vec::new();
-    patches.resize_with(WAVE.min(bins.len()), Patch::default);
+    patches.resize_with(patches.len().max(WAVE.min(bins.len())), Patch::default);
     for wave in bins.chunks(WAVE) {
         patches.par_iter_mut().zip(wave).for_each(|(patch, bin)| {
             if !progress.stopped() {

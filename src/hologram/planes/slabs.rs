@@ -5,9 +5,13 @@
 //! and the area of the kernels go with the thickest slab.
 
 use crate::hologram::lanes::Lanes;
+use rayon::prelude::*;
 
 /// Cells that the depths are sorted into.
 const CELLS: usize = 2048;
+
+/// Points that one task sorts: fixed, so that sums do not depend on the number of threads.
+const PART: usize = 1 << 16;
 
 /// Halvings of the interval in which the least slab depth is sought: to 1e-9 of the cloud's depth.
 const HALVINGS: usize = 30;
@@ -37,17 +41,29 @@ pub(in crate::hologram) struct Slabs {
 }
 
 impl Depths {
-    /// Sorts (depth, amplitude) pairs; the same pairs give the same bits.
-    pub(super) fn new(points: impl Iterator<Item = (f64, f64)> + Clone) -> Self {
-        let ends =
-            points.clone().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (d, _)| [low.min(d), high.max(d)]);
+    /// Sorts points of a (depth, amplitude) each; the same points give the same bits for any number of threads.
+    pub(super) fn new<P: Sync>(points: &[P], of: impl Fn(&P) -> (f64, f64) + Sync) -> Self {
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        let wider = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        let ends = points.par_iter().map(|p| [of(p).0; 2]).reduce(|| none, wider);
         let scale = CELLS as f64 / (ends[1] - ends[0]).max(f64::MIN_POSITIVE);
-        let empty = Cell { depth: [f64::INFINITY, f64::NEG_INFINITY], light: 0.0 };
+        let empty = Cell { depth: none, light: 0.0 };
+        let sort = |points: &[P]| {
+            let mut cells = vec![empty; CELLS];
+            for (depth, amplitude) in points.iter().map(&of) {
+                let cell = &mut cells[(((depth - ends[0]) * scale) as usize).min(CELLS - 1)];
+                cell.depth = wider(cell.depth, [depth; 2]);
+                cell.light += amplitude * amplitude;
+            }
+            cells
+        };
+        let parts: Vec<Vec<Cell>> = points.par_chunks(PART).map(sort).collect();
         let mut cells = vec![empty; CELLS];
-        for (depth, amplitude) in points {
-            let cell = &mut cells[(((depth - ends[0]) * scale) as usize).min(CELLS - 1)];
-            cell.depth = [cell.depth[0].min(depth), cell.depth[1].max(depth)];
-            cell.light += amplitude * amplitude;
+        for part in parts {
+            for (cell, part) in cells.iter_mut().zip(part) {
+                cell.depth = wider(cell.depth, part.depth);
+                cell.light += part.light;
+            }
         }
         cells.retain(|cell| cell.depth[0] <= cell.depth[1]);
         Self { cells }
@@ -171,7 +187,7 @@ mod tests {
 
     #[test]
     fn even_depths_are_cut_into_equal_parts() {
-        let depths = Depths::new(even(100_001).into_iter());
+        let depths = Depths::new(&even(100_001), |p| *p);
         assert_eq!(depths.ends(), [-0.3, -0.3 + 0.1]);
         for count in [1, 2, 3, 8, 32] {
             let slabs = depths.slabs(count, 1e-9);
@@ -187,7 +203,7 @@ mod tests {
     #[test]
     fn every_point_lies_in_its_slab_and_layers_have_slabs_of_their_own() {
         let layers: Vec<(f64, f64)> = even(900).into_iter().map(|(d, a)| ((d * 30.0).round() / 30.0, a)).collect();
-        let depths = Depths::new(layers.iter().copied());
+        let depths = Depths::new(&layers, |p| *p);
         let slabs = depths.slabs(8, 1e-7);
         // Four layers, whatever number of planes is allowed.
         assert!(slabs.depths.len() == 4 && slabs.half == 1e-7, "{slabs:?}");
@@ -206,11 +222,11 @@ mod tests {
 
     #[test]
     fn one_depth_no_depth_and_depths_on_both_sides() {
-        let one = Depths::new([(0.1, 1.0), (0.1, 2.0)].into_iter());
+        let one = Depths::new(&[(0.1, 1.0), (0.1, 2.0)], |p| *p);
         let slabs = one.slabs(5, 1e-6);
         assert_eq!((slabs.depths, slabs.half), (vec![[0.1, 0.1]], 1e-6));
-        assert!(Depths::new(std::iter::empty()).slabs(3, 1e-6).depths.is_empty());
-        let both = Depths::new([(-0.1, 1.0), (0.1, 1.0)].into_iter());
+        assert!(Depths::new(&[(0.0, 0.0); 0], |p| *p).slabs(3, 1e-6).depths.is_empty());
+        let both = Depths::new(&[(-0.1, 1.0), (0.1, 1.0)], |p| *p);
         assert_eq!(both.slabs(1, 1e-6).half, 0.1);
         assert_eq!(both.slabs(2, 1e-6).half, 1e-6);
     }

@@ -8,9 +8,9 @@
 //! Sums do not overflow: they are taken modulo 2³², where P₁, P₂ and P₃ may wrap, but |re|, |im| ≤ Σ|x||y| ≤
 //! [`BATCH`]·[`LARGEST`]² < 2³¹, so what the differences leave modulo 2³² is the value itself.
 
+use super::batch::Batch;
 use super::fixed::{FULL, Indexes, LONGEST, Strength, UNIT, Wave, evaluate, pair};
-use super::kernel::{self, BATCH, COLUMNS, Factor, Job, Limit, Panels, ROWS, Relative, factor, stride};
-use super::shape::OVERSHOOT;
+use super::kernel::{self, BATCH, COLUMNS, Factor, Job, Panels, ROWS, Relative, stride};
 use crate::hologram::lanes::Avx512;
 use std::arch::x86_64::*;
 
@@ -27,94 +27,6 @@ const LARGEST: i64 = {
 
 // |re|, |im| of a batch's sums fit 32 bits; a part's and a sum of parts' fit 16.
 const _: () = assert!(BATCH as i64 * LARGEST * LARGEST < 1 << 31 && 2 * LARGEST < 1 << 15);
-
-/// Points of a batch by quantity and axis, padded with dark ones.
-struct Batch {
-    /// Amplitude at the tile's centre.
-    amplitude: [f64; BATCH],
-    /// 1/r at the tile's centre [1/m].
-    inverse: [f64; BATCH],
-    /// Phase at the tile's centre [turns].
-    turns: [f32; BATCH],
-    /// Per axis and power of the index.
-    waves: [[[f32; BATCH]; 4]; 2],
-    /// Part by which the amplitude grows an index.
-    slope: [[f64; BATCH]; 2],
-    /// Above zero where the taper or the cut touches the tile.
-    edge: [[f64; BATCH]; 2],
-}
-
-impl Batch {
-    /// As [`factor`], in whole vectors.
-    #[inline(always)]
-    fn new(job: &Job, points: &[Relative], half: [f64; 2]) -> Self {
-        let dark = Relative { distance: 1.0, sign: 1.0, ..Relative::default() };
-        let of = |value: fn(&Relative) -> f64| -> [f64; BATCH] {
-            let mut values = [value(&dark); BATCH];
-            values.iter_mut().zip(points).for_each(|(to, p)| *to = value(p));
-            values
-        };
-        let (offsets, distance, sign) = ([of(|p| p.dx), of(|p| p.dy)], of(|p| p.distance), of(|p| p.sign));
-        let (turns, own) = (of(|p| p.turns), of(|p| p.amplitude));
-        let mut batch = Self {
-            amplitude: [0.0; BATCH],
-            inverse: [0.0; BATCH],
-            turns: [0.0; BATCH],
-            waves: [[[0.0; BATCH]; 4]; 2],
-            slope: [[0.0; BATCH]; 2],
-            edge: [[0.0; BATCH]; 2],
-        };
-        let mut base = [0.0; BATCH];
-        for k in 0..BATCH {
-            let [dx, dy] = [offsets[0][k], offsets[1][k]];
-            let r = (dx * dx + dy * dy + distance[k] * distance[k]).sqrt();
-            batch.inverse[k] = 1.0 / r;
-            batch.amplitude[k] = own[k] / r;
-            let phase = sign[k] * r * job.wavenumber + turns[k];
-            base[k] = phase - phase.floor();
-            batch.turns[k] = base[k] as f32;
-        }
-        for axis in 0..2 {
-            let constants = &job.axes[axis];
-            let (tapered, cut) = match job.limit {
-                Limit::None => (0.0, 0.0),
-                Limit::Hard => (0.0, 1.0),
-                Limit::Soft(_) => (1.0, 0.0),
-            };
-            for k in 0..BATCH {
-                let step = constants.pitch * batch.inverse[k];
-                let s = offsets[axis][k] * batch.inverse[k];
-                let bend = 1.0 - s * s;
-                let scale = sign[k] * constants.pitch * job.wavenumber;
-                let second = 0.5 * scale * bend * step;
-                // Whole turns an index are none; they leave whole halves of a turn at the centre.
-                let whole = (scale * s).round_ties_even();
-                let turns = if axis == 0 { base[k] } else { 0.0 } - whole * half[axis];
-                let waves = &mut batch.waves[axis];
-                waves[0][k] = (65_536.0 * (turns - turns.floor())) as f32;
-                waves[1][k] = (65_536.0 * (scale * s - whole)) as f32;
-                waves[2][k] = (65_536.0 * second) as f32;
-                waves[3][k] = (-65_536.0 * second * s * step) as f32;
-                batch.slope[axis][k] = -s * step;
-                let first = constants.scale * bend * step.abs() * half[axis];
-                let (position, reach) = (constants.scale * s.abs() + constants.offset, step.abs() * half[axis]);
-                let taper = position + first * (1.0 + 1.5 * s.abs() * reach);
-                let limit = distance[k] * constants.tangent;
-                let beyond = offsets[axis][k].abs() + half[axis] * constants.pitch.abs() - limit;
-                batch.edge[axis][k] = if tapered > 0.0 { taper } else { cut * beyond };
-            }
-        }
-        batch
-    }
-    /// Largest amplitude anywhere in the tile, `own` at its centre.
-    fn peak(&self, axis: usize, own: impl Fn(usize) -> f64, half: f64) -> f64 {
-        let one = |k: usize| {
-            let overshoot = if self.edge[axis][k] > 0.0 { OVERSHOOT } else { 1.0 };
-            own(k).abs() * (1.0 + self.slope[axis][k].abs() * half) * overshoot
-        };
-        (0..BATCH).map(one).fold(0.0, f64::max)
-    }
-}
 
 /// Where factors go, in 32-bit lanes: steps of a pair of points, of a part, of a block of vectors, vectors of a block.
 struct Layout {
@@ -189,10 +101,7 @@ unsafe fn fill(
     };
     let strength = |k: usize| Strength::of(amplitude(k), batch.slope[axis][k]);
     let tapered = |k: usize| {
-        let p = points.get(k)?;
-        let offset = if axis == 0 { p.dx } else { p.dy };
-        let mut found = factor(job, &job.axes[axis], p, offset, batch.inverse[k], half);
-        found.base = if axis == 0 { batch.turns[k] } else { 0.0 };
+        let mut found = batch.tapered(job, points.get(k)?, k, axis, half);
         found.amplitude = (amplitude(k) * UNIT) as f32;
         Some(found)
     };

@@ -5,6 +5,7 @@
 //! [`super::shape`].
 
 use super::edge::{EdgeTable, SEGMENTS};
+use super::shape::Kernel;
 use crate::hologram::Cull;
 use crate::hologram::definition::Optics;
 use crate::hologram::lanes::{Aligned, Lanes, cos_sin};
@@ -12,6 +13,17 @@ use std::f64::consts::PI;
 
 /// Points of a batch: X of 32 columns and one block of Y stay in a first-level cache of 32 KB.
 pub(super) const BATCH: usize = 64;
+
+/// Points of a batch for the matrix unit: its sums are read and written less often.
+pub(super) const LONG_BATCH: usize = 2 * BATCH;
+
+/// Points of a batch for a kernel.
+pub(super) const fn batch(kernel: Kernel) -> usize {
+    match kernel {
+        Kernel::Bfloat => LONG_BATCH,
+        Kernel::Paths | Kernel::Float | Kernel::Integer => BATCH,
+    }
+}
 
 /// Rows of the product's register block.
 pub(super) const ROWS: usize = 4;
@@ -119,6 +131,14 @@ enum Edge<'a> {
     },
 }
 
+impl Factor<'_> {
+    /// One that nothing limits: the phase's powers [turns], and the amplitude, which grows by the part `slope` an index.
+    #[cfg(target_arch = "x86_64")]
+    pub(super) fn flat([base, first, second, third]: [f32; 4], amplitude: f32, slope: f32) -> Self {
+        Self { base, f: [first, second, third], amplitude, slope, sign: 1.0, edge: Edge::Flat }
+    }
+}
+
 /// Third-order expansion of the sphere along an axis: `offset` = Δ on it at the tile's centre, `half` its half size in
 /// indexes, `inverse` = 1/r.
 #[inline(always)]
@@ -218,14 +238,18 @@ pub(super) struct Panels {
 }
 
 /// Memory of [`Panels`] for a tile [bytes].
-pub(super) fn bytes(width: usize, height: usize) -> u64 {
-    let factors = BATCH * 2 * width + row_factors(height) + 2 * (height.max(width) + 32);
+pub(super) fn bytes(width: usize, height: usize, kernel: Kernel) -> u64 {
+    let factors = BATCH * 2 * width + row_factors(height, kernel) + 2 * (height.max(width) + 32);
     4 * (factors + 2 * width * height + 5 * 16) as u64
 }
 
-/// Values that the factors of rows take, with the strides of either kind of product.
-fn row_factors(height: usize) -> usize {
-    (BATCH * 2 * height.next_multiple_of(ROWS)).max(BATCH / 2 * 3 * stride(height))
+/// Values that the factors of rows take; those of columns take [`BATCH`]·2 each with every kernel.
+fn row_factors(height: usize, kernel: Kernel) -> usize {
+    match kernel {
+        Kernel::Bfloat => LONG_BATCH * 2 * height,
+        Kernel::Integer => BATCH / 2 * 3 * stride(height),
+        Kernel::Paths | Kernel::Float => BATCH * 2 * height.next_multiple_of(ROWS),
+    }
 }
 
 /// Stride of the rows' factors in products of integers: whole vectors, an odd number of cache lines, so that the lines
@@ -237,9 +261,9 @@ pub(super) const fn stride(height: usize) -> usize {
 
 impl Panels {
     /// Room for a tile, dark.
-    pub(super) fn clear(&mut self, width: usize, height: usize) {
+    pub(super) fn clear(&mut self, width: usize, height: usize, kernel: Kernel) {
         self.x.reserve(BATCH * 2 * width);
-        self.y.reserve(row_factors(height));
+        self.y.reserve(row_factors(height, kernel));
         self.line.reserve(2 * (height.max(width) + 32));
         for part in [&mut self.re, &mut self.im] {
             part.reserve(width * height);

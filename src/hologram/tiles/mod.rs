@@ -5,11 +5,15 @@
 //! assumption enters: each factor is the sphere's own expansion about the tile, with f64 set-up per point and tile.
 //! Where no tile is small enough (wide angles, near points) each pixel takes its own exact path.
 //!
-//! The products are of f32, or of 16-bit integers where the processor multiplies those in pairs and their rounding is a
-//! small part of the wanted error.
+//! The products are of f32; of 16-bit integers where the processor multiplies those in pairs and their rounding is a small
+//! part of the wanted error; or of bfloat16 where it has a matrix unit and the error allows that.
 //!
 //! The engines `direct` and `tiles` are this one, with tiles small enough for 1e-4, or for the error that was asked.
 
+#[cfg(target_arch = "x86_64")]
+mod batch;
+#[cfg(target_arch = "x86_64")]
+mod bfloat;
 mod edge;
 #[cfg(target_arch = "x86_64")]
 mod fixed;
@@ -25,12 +29,14 @@ pub(crate) use shape::{Kernel, Products, Shape};
 
 use super::Cull;
 use super::definition::Optics;
+#[cfg(target_arch = "x86_64")]
+use super::lanes::matrix::Amx;
 use super::lanes::{InstructionSet, dispatch};
 use super::sources::{Source, contrast, tilt};
 use crate::error::Result;
 use crate::field::{Complex32, Field, Grid};
 use crate::progress::Progress;
-use kernel::{BATCH, Job, Panels, Relative, add_batch};
+use kernel::{Job, LONG_BATCH, Panels, Relative, add_batch};
 use pixels::add_exact;
 use rayon::prelude::*;
 use shape::Seen;
@@ -59,7 +65,7 @@ impl Class {
     }
     /// Memory for this class's tables and one wave of tiles [bytes].
     pub(crate) fn bytes(&self, optics: &Optics, cull: Cull) -> u64 {
-        let tile = kernel::bytes(self.shape.width, self.shape.height);
+        let tile = kernel::bytes(self.shape.width, self.shape.height, self.shape.kernel);
         let table = if cull == Cull::Soft {
             let [lowest, highest] = self.q_range(optics);
             EdgeTable::bytes(lowest, highest)
@@ -209,6 +215,7 @@ pub(crate) fn add(
     let axes = [Axis::new(optics, 0, limit), Axis::new(optics, 1, limit)];
     let Shape { width, height, kernel, .. } = class.shape;
     let job = Job { width, height, axes: &axes, wavenumber: 1.0 / optics.wavelength, limit };
+    let most = kernel::batch(kernel);
     let members = class.members(sources);
     let tangent = class.tangent(optics, limit);
     let grid = field.grid;
@@ -221,7 +228,7 @@ pub(crate) fn add(
             .map(|&tile| {
                 let at = [tile % across * width, tile / across * height];
                 let mut panels = Panels::default();
-                panels.clear(width, height);
+                panels.clear(width, height, kernel);
                 let center = [
                     grid.x(at[0]) + 0.5 * (width as f64 - 1.0) * grid.pitch_x,
                     grid.y(at[1]) - 0.5 * (height as f64 - 1.0) * grid.pitch_y,
@@ -230,7 +237,7 @@ pub(crate) fn add(
                 let reach = half[0] + tangent[0] * class.distance[1];
                 let first = members.partition_point(|s| s.x < center[0] - reach);
                 let last = members.partition_point(|s| s.x <= center[0] + reach);
-                let mut batch = [Relative::default(); BATCH];
+                let mut batch = [Relative::default(); LONG_BATCH];
                 let (mut count, mut lit) = (0, false);
                 for s in &members[first..last] {
                     let (dx, dy) = (center[0] - s.x, center[1] - s.y);
@@ -242,11 +249,11 @@ pub(crate) fn add(
                     let (distance, amplitude) = (s.distance, s.amplitude);
                     batch[count] = Relative { dx, dy, distance, amplitude, turns: s.turns, sign: s.sign };
                     count += 1;
-                    if count == BATCH {
+                    if count == most {
                         if progress.stopped() {
                             return None;
                         }
-                        flush(set, &job, &batch, &mut panels, kernel);
+                        flush(set, &job, &batch[..count], &mut panels, kernel);
                         (count, lit) = (0, true);
                     }
                 }
@@ -274,14 +281,16 @@ pub(crate) fn add(
 }
 
 fn flush(set: InstructionSet, job: &Job, points: &[Relative], panels: &mut Panels, kernel: Kernel) {
-    // SAFETY: the set was detected on this machine, integers were chosen for one that has them; the panels were cleared
-    // for this job.
+    // SAFETY: the set was detected on this machine, integers and bfloat16 were chosen for one that has them; the panels
+    // were cleared for this job and kernel.
     unsafe {
         match kernel {
             Kernel::Paths => dispatch!(set, add_exact(job: &Job, points: &[Relative], panels: &mut Panels)),
             #[cfg(target_arch = "x86_64")]
-            Kernel::Integer if set == InstructionSet::Avx512Vnni => integer::add_batch(job, points, panels),
-            Kernel::Float | Kernel::Integer => {
+            Kernel::Integer => integer::add_batch(job, points, panels),
+            #[cfg(target_arch = "x86_64")]
+            Kernel::Bfloat => bfloat::add_batch::<Amx>(job, points, panels),
+            _ => {
                 dispatch!(set, add_batch(job: &Job, points: &[Relative], panels: &mut Panels));
             }
         }

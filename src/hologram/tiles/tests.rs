@@ -1,10 +1,11 @@
-//! Products in integers: against f32 on one tile, and against the oracle as fields.
+//! Products in integers and in bfloat16: against f32 on one tile, and against the oracle as fields.
 
-use super::kernel::{COLUMNS, ROWS};
-use super::shape::{INTEGER_NOISE, OVERSHOOT};
+use super::kernel::{BATCH, COLUMNS, ROWS};
+use super::shape::{BFLOAT_NOISE, INTEGER_NOISE, OVERSHOOT};
 use super::*;
 use crate::field::{Complex64, relative_error};
 use crate::hologram::lanes::Portable;
+use crate::hologram::lanes::matrix::{Plain, SIDE};
 use crate::hologram::{HologramSettings, Method, compute, oracle, plan};
 use crate::points::PointSource;
 use crate::random::Random;
@@ -21,23 +22,25 @@ fn present() -> bool {
     present
 }
 
-/// A batch's sum over a tile by integers, and by f32.
-fn both(width: usize, height: usize, points: &[Relative]) -> [Vec<Complex64>; 2] {
+/// A batch's sum over a tile by a kernel, bfloat16 with the plain unit, and by f32.
+fn both(kernel: Kernel, width: usize, height: usize, points: &[Relative]) -> [Vec<Complex64>; 2] {
     let grid = Grid::new(width, height, 8e-6, 6.5e-6).expect("grid");
     let optics = Optics::new(&grid, WAVELENGTH).expect("optics");
     let table = EdgeTable::new(0.1, 0.5, &Progress::new());
     let limit = Limit::Soft(&table);
     let axes = [Axis::new(&optics, 0, limit), Axis::new(&optics, 1, limit)];
     let job = Job { width, height, axes: &axes, wavenumber: 1.0 / WAVELENGTH, limit };
-    [true, false].map(|integer| {
+    [kernel, Kernel::Float].map(|kernel| {
         let mut panels = Panels::default();
-        panels.clear(width, height);
-        // SAFETY: detected by the caller; cleared above.
-        unsafe {
-            if integer {
-                integer::add_batch(&job, points, &mut panels);
-            } else {
-                add_batch::<Portable>(&job, points, &mut panels);
+        panels.clear(width, height, kernel);
+        for points in points.chunks(kernel::batch(kernel)) {
+            // SAFETY: detected by the caller; cleared above.
+            unsafe {
+                match kernel {
+                    Kernel::Integer => integer::add_batch(&job, points, &mut panels),
+                    Kernel::Bfloat => bfloat::add_batch::<Plain>(&job, points, &mut panels),
+                    Kernel::Float | Kernel::Paths => add_batch::<Portable>(&job, points, &mut panels),
+                }
             }
         }
         let parts = panels.re.values()[..width * height].iter().zip(&panels.im.values()[..width * height]);
@@ -61,7 +64,7 @@ fn a_full_batch_in_phase_does_not_overflow() {
         let wave = Relative { distance: 1e4, amplitude, turns: eighth as f64 / 8.0, sign: 1.0, ..Relative::default() };
         let turns = wave.turns - (wave.distance / WAVELENGTH).fract();
         let points = [Relative { turns, ..wave }; BATCH];
-        let [integer, float] = both(32, 8, &points);
+        let [integer, float] = both(Kernel::Integer, 32, 8, &points);
         let center = Complex64::from_polar(
             amplitude * BATCH as f64 / wave.distance,
             eighth as f64 * std::f64::consts::FRAC_PI_4,
@@ -72,9 +75,22 @@ fn a_full_batch_in_phase_does_not_overflow() {
     }
     // On the taper's edge, where its overshoot sets the scale.
     let edge = Relative { dx: 5.2e-3, dy: 6.3e-3, distance: 0.2, amplitude: 1.0, turns: 0.3, sign: -1.0 };
-    let [integer, float] = both(96, 40, &[edge; BATCH]);
+    let [integer, float] = both(Kernel::Integer, 96, 40, &[edge; BATCH]);
     let error = distance(&integer, &float);
     assert!(error < 4.0 * INTEGER_NOISE, "{error:.2e}");
+}
+
+/// Points up to 9 mm aside of a tile, of both signs: some on the taper's edge.
+fn around(seed: u64, count: usize) -> Vec<Relative> {
+    (0..count as u64)
+        .map(|i| {
+            let mut random = Random::new(seed, i);
+            let mut aside = |half: f64| half * (2.0 * random.uniform() - 1.0);
+            let (dx, dy, turns) = (aside(9e-3), aside(9e-3), aside(1.0));
+            let sign = if i % 3 == 0 { -1.0 } else { 1.0 };
+            Relative { dx, dy, distance: 0.2, amplitude: 1.0, turns, sign }
+        })
+        .collect()
 }
 
 #[test]
@@ -85,16 +101,8 @@ fn rounding_is_what_is_stated_for_every_count_of_points_and_size_of_tile() {
     let (mut squares, mut tries) = (0.0, 0.0);
     for (number, count) in [1, 2, 3, 31, 63, 64, 64, 64].into_iter().enumerate() {
         for (width, height) in [(COLUMNS, ROWS), (96, 36), (128, 128), (192, 188)] {
-            let points: Vec<Relative> = (0..count as u64)
-                .map(|i| {
-                    let mut random = Random::new(number as u64, i);
-                    let mut aside = |half: f64| half * (2.0 * random.uniform() - 1.0);
-                    let (dx, dy, turns) = (aside(9e-3), aside(9e-3), aside(1.0));
-                    let sign = if i % 3 == 0 { -1.0 } else { 1.0 };
-                    Relative { dx, dy, distance: 0.2, amplitude: 1.0, turns, sign }
-                })
-                .collect();
-            let [integer, float] = both(width, height, &points);
+            let points = around(number as u64, count);
+            let [integer, float] = both(Kernel::Integer, width, height, &points);
             let error = distance(&integer, &float);
             // One point has its own few roundings; those of many are independent.
             let allowed = if count < 30 { 3.0 } else { OVERSHOOT * 2f64.sqrt() } * INTEGER_NOISE;
@@ -107,6 +115,31 @@ fn rounding_is_what_is_stated_for_every_count_of_points_and_size_of_tile() {
     let mean = (squares / tries).sqrt();
     println!("rounding {mean:.2e}, stated {:.2e} a factor", INTEGER_NOISE);
     assert!(mean > 0.5 * INTEGER_NOISE, "{mean:.2e}: states far too much");
+}
+
+#[test]
+fn bfloat16_rounds_as_stated_for_every_count_of_points_and_size_of_tile() {
+    if !present() {
+        return;
+    }
+    let (mut squares, mut tries) = (0.0, 0.0);
+    for (number, count) in [1, 2, 15, 16, 17, 64, 65, 127, 128, 129].into_iter().enumerate() {
+        for (width, height) in [(COLUMNS, SIDE), (96, 48), (128, 112), (192, 192)] {
+            let mut points = around(number as u64, count);
+            // However bright others are, each is rounded to its own size: what is dim beside them may be lost in the sum.
+            points.iter_mut().step_by(7).for_each(|p| p.amplitude = 1e-3);
+            let [bfloat, float] = both(Kernel::Bfloat, width, height, &points);
+            let error = distance(&bfloat, &float);
+            let allowed = if count < 30 { 1.6 } else { 1.0 } * BFLOAT_NOISE;
+            assert!(error < allowed, "{count} on {width}×{height}: {error:.2e} over {allowed:.2e}");
+            if count > 60 {
+                (squares, tries) = (squares + error * error, tries + 1.0);
+            }
+        }
+    }
+    let mean = (squares / tries).sqrt();
+    println!("rounding {mean:.2e}, stated {BFLOAT_NOISE:.2e}");
+    assert!(mean > 0.5 * BFLOAT_NOISE, "{mean:.2e}: states far too much");
 }
 
 fn settings() -> HologramSettings {
