@@ -78,13 +78,14 @@ pub(crate) fn sources(points: &[PointSource]) -> Result<Vec<Source>> {
             );
             return Err(Error::parameter("points", what));
         }
+        let turns = p.phase / std::f64::consts::TAU;
         let source = Source {
             x: p.position.x,
             y: p.position.y,
             distance: p.position.z.abs(),
             sign: if p.position.z > 0.0 { -1.0 } else { 1.0 },
             amplitude: f64::from(p.amplitude),
-            turns: (p.phase / std::f64::consts::TAU).rem_euclid(1.0),
+            turns: turns - turns.floor(),
         };
         Ok((p.amplitude != 0.0).then_some(source))
     };
@@ -125,13 +126,14 @@ impl Coverage {
             [grid.x(0) - 0.5 * grid.pitch_x, grid.x(grid.width - 1) + 0.5 * grid.pitch_x],
             [grid.y(grid.height - 1) - 0.5 * grid.pitch_y, grid.y(0) + 0.5 * grid.pitch_y],
         ];
+        let slopes = [0, 1].map(|axis| optics.cone(axis, 1.0));
         let one = |source: &Source| {
             let power = source.amplitude * source.amplitude;
             let (mut part, mut pixels) = (1.0, 1.0);
             for (axis, position) in [source.x, source.y].into_iter().enumerate() {
                 let [low, high] = edges[axis].map(|edge| edge - position);
                 // Half a pixel more, so that a point on the panel reaches the pixel that it stands on.
-                let cone = optics.cone(axis, source.distance).max(0.5 * optics.pitch[axis]);
+                let cone = (slopes[axis] * source.distance).max(0.5 * optics.pitch[axis]);
                 let span = (high.min(cone) - low.max(-cone)).max(0.0);
                 pixels *=
                     if cull == Cull::None { (high - low) / optics.pitch[axis] } else { span / optics.pitch[axis] };

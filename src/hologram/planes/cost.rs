@@ -13,19 +13,19 @@ use crate::hologram::definition::Optics;
 use crate::hologram::sources::Source;
 
 /// A pixel's part in a column: its factors once a plane, its transform and the sum once a moment [core-seconds].
-const FACTORS: f64 = 1.0e-9;
-const COLUMN: f64 = 1.9e-9;
+const FACTORS: f64 = 7.5e-10;
+const COLUMN: f64 = 2.2e-9;
 
 /// A pixel of a painted row: its transform, and its way into the columns.
-const ROW: f64 = 4.5e-9;
+const ROW: f64 = 3.5e-9;
 
 /// A pixel of a painted row: cleared.
-const CLEARED: f64 = 6e-10;
+const CLEARED: f64 = 7e-10;
 
 /// On the way back: a pixel of a column, of a row that crosses the panel, and of the panel.
 const BACK_COLUMN: f64 = 2.2e-9;
 const BACK_ROW: f64 = 4.7e-9;
-const WINDOW: f64 = 2.8e-9;
+const WINDOW: f64 = 5.5e-9;
 
 /// A point: gathered and sorted into planes; asked by each plane; placed in its bin.
 const GATHERED: f64 = 1.0e-7;
@@ -33,12 +33,12 @@ const ASKED: f64 = 1e-9;
 const PLACED: f64 = 6e-8;
 
 /// A group of points, and a pixel that it is painted on.
-const GROUPED: f64 = 9.7e-7;
-const PAINTED: f64 = 3.0e-10;
+const GROUPED: f64 = 9.4e-7;
+const PAINTED: f64 = 2.9e-10;
 
 /// A pixel of a patch: cleared, and added to the plane; touched for the first time.
-const PATCHED: f64 = 1.45e-9;
-const TOUCHED: f64 = 4e-9;
+const PATCHED: f64 = 1.3e-9;
+const TOUCHED: f64 = 1.5e-9;
 
 /// A byte of the kernels' tables.
 const TABLE_BYTE: f64 = 2e-9;
@@ -115,7 +115,7 @@ impl Parameters {
         let axes = if optics.pitch[0] == optics.pitch[1] { 0..1 } else { 0..2 };
         let tables: u64 = axes.map(|axis| Table::bytes(optics, axis, h, self.tail, self.table)).sum();
         let points =
-            cloud.sources.len() as u64 * (size_of::<Source>() + size_of::<Dab>() + paint::ORDER_BYTES + 1) as u64;
+            cloud.sources.len() as u64 * (size_of::<Source>() + size_of::<Dab>() + paint::ORDER_BYTES + 8) as u64;
         plane + Spectrum::bytes(&layout, self.rank) + paint::bytes(half, self.rank) + tables + points
     }
 }

@@ -76,10 +76,11 @@ pub(crate) struct Cloud {
 impl Cloud {
     /// Gathers the sources whose light meets the panel.
     pub(crate) fn new(optics: &Optics, grid: &Grid, sources: &[Source]) -> Self {
+        let slopes = [0, 1].map(|axis| reach(optics, axis, 1.0));
         let meets = |s: &Source| {
             let spans = s.span(grid);
             (0..2).all(|axis| {
-                let reach = reach(optics, axis, s.distance) + 64.0 * optics.pitch[axis];
+                let reach = slopes[axis] * s.distance + 64.0 * optics.pitch[axis];
                 spans[axis][0] <= reach && spans[axis][1] >= -reach
             })
         };
@@ -91,7 +92,7 @@ impl Cloud {
             [0, 1].map(|axis| {
                 // An alias, one period away, must lie beyond the point's reach from the farthest pixel.
                 let farthest = at[axis].abs().max((pixels[axis] - 1.0 - at[axis]).abs());
-                [at[axis], at[axis], farthest + reach(optics, axis, s.distance) / optics.pitch[axis]]
+                [at[axis], at[axis], farthest + slopes[axis] * s.distance / optics.pitch[axis]]
             })
         };
         let none = pixels.map(|pixels| [f64::INFINITY, f64::NEG_INFINITY, pixels]);
@@ -292,11 +293,10 @@ pub(crate) fn field(
     let mut moments: Vec<Vec<Complex32>> = (0..parameters.rank).map(|_| zeroed(samples)).collect();
     let mut spectrum = Spectrum::new(optics, &layout, h, set);
     let mut patches = Patches::default();
-    let planes: Vec<u8> = sources.par_iter().map(|s| slabs.index(s.sign * s.distance) as u8).collect();
-    for k in 0..slabs.depths.len() {
+    for (k, members) in slabs.members(sources, |s| s.sign * s.distance).iter().enumerate() {
         let middle = slabs.plane(k);
-        let here = planes.par_iter().zip(sources).filter(|(plane, _)| usize::from(**plane) == k);
-        let dabs: Vec<Dab> = here.map(|(_, s)| dab(optics, grid, &layout, carrier, s, middle)).collect();
+        let one = |&i: &u32| dab(optics, grid, &layout, carrier, &sources[i as usize], middle);
+        let dabs: Vec<Dab> = members.par_iter().map(one).collect();
         for moment in &mut moments {
             moment.par_chunks_mut(1 << 16).for_each(|part| {
                 if !progress.stopped() {

@@ -136,6 +136,18 @@ impl Slabs {
     pub(in crate::hologram) fn index(&self, depth: f64) -> usize {
         self.depths.partition_point(|slab| slab[1] < depth).min(self.depths.len().saturating_sub(1))
     }
+    /// Indexes of the points of each slab, in order.
+    pub(super) fn members<P: Sync>(&self, points: &[P], depth: impl Fn(&P) -> f64 + Sync) -> Vec<Vec<u32>> {
+        let sort = |(part, points): (usize, &[P])| {
+            let mut members = vec![Vec::new(); self.depths.len()];
+            for (i, point) in points.iter().enumerate() {
+                members[self.index(depth(point))].push((part * PART + i) as u32);
+            }
+            members
+        };
+        let parts: Vec<Vec<Vec<u32>>> = points.par_chunks(PART).enumerate().map(sort).collect();
+        (0..self.depths.len()).map(|k| parts.iter().flat_map(|part| &part[k]).copied().collect()).collect()
+    }
     /// Depth of a slab's plane [m].
     pub(in crate::hologram) fn plane(&self, index: usize) -> f64 {
         0.5 * (self.depths[index][0] + self.depths[index][1])

@@ -93,7 +93,7 @@ impl Class {
         let parts: Vec<f64> =
             self.sources.par_chunks(4096).map(|part| part.iter().map(|&i| count(&sources[i])).sum()).collect();
         let tiles = grid.width.div_ceil(self.shape.width) * grid.height.div_ceil(self.shape.height);
-        parts.iter().sum::<f64>() * tile + tiles as f64 * 5e-6
+        parts.iter().sum::<f64>() * tile + tiles as f64 * 3e-6
     }
     /// Distance of the nearest source [m].
     pub(crate) fn nearest(&self) -> f64 {
