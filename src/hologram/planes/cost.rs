@@ -27,10 +27,8 @@ const BACK_COLUMN: f64 = 2.2e-9;
 const BACK_ROW: f64 = 4.7e-9;
 const WINDOW: f64 = 5.5e-9;
 
-/// A point: gathered and sorted into planes; asked by each plane; placed in its bin.
-const GATHERED: f64 = 1.0e-7;
-const ASKED: f64 = 1e-9;
-const PLACED: f64 = 6e-8;
+/// A point: checked and gathered, sorted into planes and made relative to its own.
+const GATHERED: f64 = 2.7e-7;
 
 /// A group of points, and a pixel that it is painted on.
 const GROUPED: f64 = 9.4e-7;
@@ -60,7 +58,7 @@ impl Parameters {
             + grid.len() as f64 * WINDOW;
         let axes = if optics.pitch[0] == optics.pitch[1] { 0..1 } else { 0..2 };
         let tables: u64 = axes.map(|axis| Table::bytes(optics, axis, slabs.half, self.tail, self.table)).sum();
-        let points = count * (GATHERED + PLACED + planes * ASKED);
+        let points = count * GATHERED;
         spectra + points + self.painting(optics, cloud, slabs) + tables as f64 * TABLE_BYTE
     }
 
@@ -99,7 +97,7 @@ impl Parameters {
             columns * rows + 2.0 * largest * (columns * cone[1] + rows * cone[0]) + 4.0 * square * cone[0] * cone[1];
         let side = |axis: usize| kernel + 2.0 * cone[axis] * inside / (inside + 1.0) + bin * apart(inside);
         let patch = rank * (side(0) + 8.0) * side(1);
-        let fresh = patches.min(paint::WAVE as f64);
+        let fresh = patches.min(paint::wave() as f64);
         groups * (GROUPED + rank * area * PAINTED) + patch * (patches * PATCHED + fresh * TOUCHED)
     }
 

@@ -27,6 +27,7 @@ use paint::{Brush, Canvas, Patches, paint};
 use rayon::prelude::*;
 use slabs::Depths;
 use spectrum::Spectrum;
+use std::borrow::Cow;
 
 pub(in crate::hologram) use paint::Dab;
 pub(in crate::hologram) use slabs::Slabs;
@@ -60,9 +61,9 @@ pub(crate) struct Chosen {
 
 /// What planes need to know of the sources together, gathered in one pass.
 #[derive(Clone, Debug)]
-pub(crate) struct Cloud {
-    /// The sources whose light meets the panel.
-    pub(in crate::hologram) sources: Vec<Source>,
+pub(crate) struct Cloud<'a> {
+    /// The sources whose light meets the panel; copied only where some do not.
+    pub(in crate::hologram) sources: Cow<'a, [Source]>,
     /// Light by signed distance ζ = −z: it runs from −ζ to the panel at 0 [m].
     depths: Depths,
     /// Lowest and highest panel column, and row.
@@ -73,9 +74,9 @@ pub(crate) struct Cloud {
     steepness: f64,
 }
 
-impl Cloud {
+impl<'a> Cloud<'a> {
     /// Gathers the sources whose light meets the panel.
-    pub(crate) fn new(optics: &Optics, grid: &Grid, sources: &[Source]) -> Self {
+    pub(crate) fn new(optics: &Optics, grid: &Grid, sources: &'a [Source]) -> Self {
         let slopes = [0, 1].map(|axis| reach(optics, axis, 1.0));
         let meets = |s: &Source| {
             let spans = s.span(grid);
@@ -84,7 +85,11 @@ impl Cloud {
                 spans[axis][0] <= reach && spans[axis][1] >= -reach
             })
         };
-        let sources: Vec<Source> = sources.par_iter().filter(|s| meets(s)).copied().collect();
+        let sources = if sources.par_iter().all(meets) {
+            Cow::Borrowed(sources)
+        } else {
+            Cow::Owned(sources.par_iter().filter(|s| meets(s)).copied().collect())
+        };
         let pixels = [grid.width as f64, grid.height as f64];
         // Lowest and highest place, and period, of each axis: whatever the order, the same.
         let one = |s: &Source| {

@@ -29,8 +29,11 @@ pub(super) fn bin(half: [usize; 2], rank: usize) -> usize {
 /// Most dabs of one patch: a crowded bin is shared among threads, and f32 sums of more terms lose digits.
 const LARGEST: usize = 4096;
 
-/// Patches that are painted before they are added.
-pub(super) const WAVE: usize = 64;
+/// Patches that are painted before they are added: few, so that they stay in a cache, but some for every thread. The
+/// order in which they are added does not depend on their number.
+pub(super) fn wave() -> usize {
+    (4 * rayon::current_num_threads()).max(16)
+}
 
 /// Rows that one task adds to.
 const BAND: usize = 16;
@@ -91,7 +94,7 @@ pub(super) fn bytes(half: [usize; 2], rank: usize) -> u64 {
     let bin = bin(half, rank);
     let [width, height] = half.map(|half| 2 * half + bin + 20);
     let lines = 4 * (GROUP * 2 * (width + 32) + 2 * (GROUP + 1) * (height + 32));
-    (WAVE * (width + 16) * height * 8 * rank + rayon::current_num_threads() * lines) as u64
+    (wave() * (width + 16) * height * 8 * rank + rayon::current_num_threads() * lines) as u64
 }
 
 /// Paints dabs, which must lie on the canvas with their whole kernels.
@@ -104,8 +107,8 @@ pub(super) fn paint(
     progress: &Progress,
 ) -> Result<()> {
     let bins = bins(dabs, canvas.width, brush.bin);
-    patches.resize_with(patches.len().max(WAVE.min(bins.len())), Patch::default);
-    for wave in bins.chunks(WAVE) {
+    patches.resize_with(patches.len().max(wave().min(bins.len())), Patch::default);
+    for wave in bins.chunks(wave()) {
         patches.par_iter_mut().zip(wave).for_each(|(patch, bin)| {
             if !progress.stopped() {
                 paint_bin(patch, brush, dabs, bin, set, progress);
