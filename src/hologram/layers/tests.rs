@@ -8,6 +8,7 @@ use crate::random::Random;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
+use std::time::Instant;
 
 const WAVELENGTH: f64 = 532e-9;
 
@@ -177,6 +178,7 @@ fn chain(layers: &[Layer], lattice: &Grid, panel: &Grid, [width, height]: [usize
     let optics = Optics::new(panel, WAVELENGTH).expect("optics");
     let grid = Grid { width, height, ..*lattice };
     let transform = Fft2::<f64>::new(grid.width, grid.height);
+    let progress = Progress::new();
     let inside = |i: usize| i % grid.width < lattice.width && i / grid.width < lattice.height;
     let place = |i: usize| i / grid.width * lattice.width + i % grid.width;
     let mut order: Vec<&Layer> = layers.iter().collect();
@@ -192,25 +194,25 @@ fn chain(layers: &[Layer], lattice: &Grid, panel: &Grid, [width, height]: [usize
         times(&mut sum, Light::Field, layer.z - at, [0.0; 2]);
         at = layer.z;
         if layer.opaque.contains(&true) {
-            transform.inverse(&mut sum);
+            transform.inverse(&mut sum, &progress);
             for (i, u) in sum.iter_mut().enumerate() {
                 if !inside(i) || layer.opaque[place(i)] {
                     *u = Complex64::default();
                 }
             }
-            transform.forward(&mut sum);
+            transform.forward(&mut sum, &progress);
         }
         let value = |i: usize| {
             let u = if inside(i) { layer.light[place(i)] } else { Complex32::default() };
             Complex64::new(u.re.into(), u.im.into())
         };
         let mut own: Vec<Complex64> = (0..grid.len()).map(value).collect();
-        transform.forward(&mut own);
+        transform.forward(&mut own, &progress);
         times(&mut own, Light::Points { behind: layer.z <= 0.0 }, 0.0, [0.0; 2]);
         sum.iter_mut().zip(&own).for_each(|(sum, u)| *sum += u);
     }
     times(&mut sum, Light::Field, -at, [panel.x(0) - lattice.x(0), panel.y(0) - lattice.y(0)]);
-    transform.inverse(&mut sum);
+    transform.inverse(&mut sum, &progress);
     (0..panel.len()).map(|i| sum[i / panel.width * grid.width + i % panel.width]).collect()
 }
 
@@ -271,4 +273,31 @@ fn layers_are_the_same_bits_for_any_number_of_threads() {
     };
     let one = run(1);
     assert!([2, 3, 7].iter().all(|&threads| run(threads) == one));
+}
+
+#[test]
+fn layers_that_are_asked_to_stop_end_within_a_transform() {
+    let panel = Grid::new(960, 700, 8e-6, 8e-6).expect("grid");
+    let layers = discs(&panel, &[-0.1, -0.09, -0.08, -0.07]);
+    let begin = Instant::now();
+    let run = |progress: &Progress| compute(&layers, &panel, &panel, WAVELENGTH, 1 << 30, progress);
+    run(&Progress::new()).expect("field");
+    let whole = begin.elapsed();
+    // The least of a few tries: the machine may be busy with something else for a while.
+    let after = (0..5).map(|_| {
+        let progress = Progress::new();
+        std::thread::scope(|scope| {
+            let worker = scope.spawn(|| run(&progress));
+            while progress.snapshot().1 == 0 {
+                std::thread::sleep(std::time::Duration::from_micros(200));
+            }
+            let asked = Instant::now();
+            progress.stop();
+            assert!(matches!(worker.join().expect("no panic"), Err(Error::Interrupted)));
+            asked.elapsed()
+        })
+    });
+    let least = after.min().expect("tries");
+    println!("layers: {whole:?}, {least:?} after the stop");
+    assert!(least < whole / 20, "{least:?} of {whole:?}");
 }
