@@ -117,8 +117,11 @@ pub fn gerchberg_saxton(
     for iteration in 0..settings.iterations {
         progress.check()?;
         let step = |i: usize| light.total[i] + change[i] * size;
-        let next: Vec<f32> =
-            (0..count).into_par_iter().map(|i| model.wish(i, step(i), wish[i], light.modulated[i])).collect();
+        let turned = |i: usize| {
+            if progress.stopped() { wish[i] } else { model.wish(i, step(i), wish[i], light.modulated[i]) }
+        };
+        let next: Vec<f32> = (0..count).into_par_iter().map(turned).collect();
+        progress.check()?;
         let next_light = model.light(&next);
         let next_judged = problem.judge(&next_light.total)?;
         if next_judged.error <= judged.error {
@@ -160,6 +163,9 @@ impl Projection<'_> {
                 Constraint::AmplitudeAndPhase => Some(plane.phasors(field)),
             };
             let each = |(i, (u, asked)): (usize, (&Complex32, &mut f32))| {
+                if self.problem.progress.stopped() {
+                    return Complex32::new(0.0, 0.0);
+                }
                 let weight = plane.weight.as_ref().map_or(1.0, |w| w[i]);
                 let (modulus, wish) = (u.norm_sqr().sqrt(), plane.amplitude[i]);
                 if exponent > 0.0 && wish > 0.0 && modulus > 0.0 {

@@ -75,6 +75,7 @@ pub fn gradient_descent(
         let share = iteration as f64 / settings.iterations as f64;
         let step = trust * settings.step * (0.05 + 0.95 * 0.5 * (1.0 + (std::f64::consts::PI * share).cos()));
         let next = adam.step(&wish, step as f32, model.range);
+        progress.check()?;
         let next_light = model.light(&next);
         let next_judged = problem.judge(&next_light.total)?;
         if next_judged.error <= judged.error {

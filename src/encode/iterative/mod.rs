@@ -216,10 +216,14 @@ impl<'a> Problem<'a> {
                 .par_chunks(1 << 14)
                 .enumerate()
                 .map(|(chunk, field)| {
+                    if self.progress.stopped() {
+                        return (0.0, 0.0);
+                    }
                     let sums = field.iter().enumerate().map(|(i, u)| self.products(k, (chunk << 14) + i, *u));
                     sums.fold((0.0, 0.0), |sum, term| (sum.0 + term.0, sum.1 + term.1))
                 })
                 .collect();
+            self.progress.check()?;
             for part in parts {
                 cross += part.0;
                 own += part.1;
