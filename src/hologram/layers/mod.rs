@@ -7,7 +7,7 @@
 //! silhouette, K. Matsushima & S. Nakahara, *Appl. Opt.* 48, H54 (2009)), and the layer's own light is added. From the
 //! nearest layer the field is carried to the panel, back through it where that layer stands in front.
 //!
-//! Light of every layer goes in one step to the next plane that hides something, or to the panel: a [`leg`] of its way.
+//! Light of every layer goes in one step to the next plane that hides something, or to the panel: a leg of its way.
 //! Cost: one transform a layer, on its lattice and as much beyond as light spreads on the leg, and one and a half more
 //! where a layer occludes; memory: [`bytes`]. Factors are in f32 with phases reduced in f64: 1e-5 for any distance that
 //! the grid can hold.
