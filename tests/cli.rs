@@ -207,7 +207,7 @@ fn bad_pictures_and_stacks_end_in_one_line() {
     refused(f, &["compute", "black.png@100mm"], "black everywhere");
     refused(f, &["compute", "a.png@-700mm"], "not in front of the eye");
     refused(f, &["compute", "a.png+a.png", "--layers", "0"], "one to 4096");
-    refused(f, &["compute", "a.png+a.png", "--layers", "16", "--memory", "100MB"], "give more memory or fewer layers");
+    refused(f, &["compute", "a.png+a.png", "--layers", "16", "--memory", "10MB"], "give more memory or fewer layers");
     refused(f, &["compute", "a.png@100mm", "--layers", "3"], "leave --layers out");
     refused(f, &["compute", &scene("cornell.gltf"), "--layers", "3"], "picture with depth");
     refused(f, &["show", "a.png@100mm"], "focal stack");

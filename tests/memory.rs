@@ -1,7 +1,8 @@
 //! Engines keep the memory that they state: the heap's peak while a field is computed, against the plan.
 
 use glam::DVec3;
-use holodrive::field::Grid;
+use holodrive::field::{Complex32, Grid};
+use holodrive::hologram::layers::{self, Layer};
 use holodrive::hologram::{HologramSettings, Method, compute, plan};
 use holodrive::points::PointSource;
 use holodrive::progress::Progress;
@@ -81,5 +82,27 @@ fn every_engine_keeps_the_memory_that_it_states() {
         );
         assert!(beside <= stated + SMALL, "{name} {method:?}: {beside} over {stated}");
         assert!(stated <= 4 * beside + SMALL, "{name} {method:?}: states {stated}, takes {beside}");
+    }
+    // Layers that hide each other, on a lattice wider than the panel and on a smaller one.
+    for (width, height) in [(1903, 1201), (803, 701)] {
+        let lattice = Grid::new(width, height, 8e-6, 7e-6).expect("grid");
+        let layer = |k: usize| {
+            let opaque: Vec<bool> = (0..lattice.len()).map(|i| (i / 40 + 3 * k) % 5 < 2).collect();
+            let light = opaque.iter().map(|&lit| Complex32::new(f32::from(u8::from(lit)), 0.0)).collect();
+            Layer { z: -0.15 + 0.01 * k as f64, light, opaque }
+        };
+        let stack: Vec<Layer> = (0..4).map(layer).collect();
+        let stated = layers::bytes(&lattice, &grid, 632.8e-9, stack.iter().map(|layer| layer.z)).expect("bytes");
+        let before = NOW.load(Ordering::Relaxed);
+        PEAK.store(before, Ordering::Relaxed);
+        let field = layers::compute(&stack, &lattice, &grid, 632.8e-9, stated, &Progress::new()).expect("field");
+        let beside = PEAK.load(Ordering::Relaxed) - before - 8 * field.samples.len();
+        println!(
+            "layers {width}×{height}: {:.1} MB taken, {:.1} MB stated",
+            beside as f64 / 1048576.0,
+            stated as f64 / 1048576.0
+        );
+        assert!(beside <= stated as usize + SMALL, "layers: {beside} over {stated}");
+        assert!(stated as usize <= 4 * beside + SMALL, "layers: states {stated}, takes {beside}");
     }
 }

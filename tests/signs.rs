@@ -280,7 +280,7 @@ fn a_reference_at_a_positive_angle_runs_to_the_right_and_up() {
             pipeline::simulated_light(&encoded.frame, &Simulation::default(), &Progress::new()).expect("light");
         // The zero order, the brightest peak of the spectrum, stands at +carrier: f_x > 0 is light that runs to +x.
         let mut spectrum = behind.samples.clone();
-        Fft2::new(grid.width, grid.height).forward(&mut spectrum);
+        Fft2::new(grid.width, grid.height).forward(&mut spectrum, &Progress::new());
         let peak = (0..spectrum.len()).max_by(|&a, &b| spectrum[a].norm_sqr().total_cmp(&spectrum[b].norm_sqr()));
         let peak = peak.expect("samples");
         let found = DVec2::new(grid.frequency_x(peak % grid.width), grid.frequency_y(peak / grid.width));

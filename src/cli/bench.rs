@@ -128,8 +128,8 @@ fn iterations(args: &IterationsArgs) -> Result<Report> {
     let pair = (0..3)
         .map(|_| {
             let begin = Instant::now();
-            transform.forward(&mut samples);
-            transform.inverse(&mut samples);
+            transform.forward(&mut samples, &bar.progress);
+            transform.inverse(&mut samples, &bar.progress);
             begin.elapsed().as_secs_f64()
         })
         .fold(f64::INFINITY, f64::min);

@@ -93,7 +93,8 @@ fn field(
     panel: &Panel,
     progress: &Progress,
 ) -> Result<(Field, usize)> {
-    let needed = slices.bytes() + layers::bytes(&slices.lattice, &panel.grid)?;
+    let needed =
+        slices.bytes() + layers::bytes(&slices.lattice, &panel.grid, wavelength, slices.depths().iter().copied())?;
     if needed > memory {
         let hint = "give more memory or fewer layers".to_owned();
         return Err(Error::Memory { what: "layers", needed: needed.div_ceil(1 << 20), budget: memory >> 20, hint });

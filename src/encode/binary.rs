@@ -122,7 +122,7 @@ fn search(
     let (width, height) = (grid.width, grid.height);
     let mut impulse = Field::zeros(grid, wavelength);
     impulse.samples[0] = Complex32::new(1.0, 0.0);
-    let response = band::limit(&impulse, aperture).0.samples;
+    let response = band::limit(&impulse, aperture, progress)?.0.samples;
     let taps: Vec<(usize, usize, Complex32)> = response
         .iter()
         .enumerate()
@@ -136,11 +136,14 @@ fn search(
     for _ in 0..sweeps {
         progress.check()?;
         let samples = open.iter().zip(reference).map(|(t, r)| r * t).collect();
-        let mut error = band::limit(&Field { grid, wavelength, samples }, aperture).0.samples;
+        let mut error = band::limit(&Field { grid, wavelength, samples }, aperture, progress)?.0.samples;
         let cross: f64 = error.iter().zip(&wanted.samples).map(|(g, u)| f64::from((g * u.conj()).re)).sum();
         let scale = *scale.get_or_insert((cross / wanted.energy()) as f32);
         error.iter_mut().zip(&wanted.samples).for_each(|(e, u)| *e -= u * scale);
         for at in 0..open.len() {
+            if at.is_multiple_of(width) {
+                progress.check()?;
+            }
             let change = 1.0 - 2.0 * open[at];
             if 2.0 * change * (error[at].conj() * reference[at]).re + own >= 0.0 {
                 continue;

@@ -63,7 +63,7 @@ pub(super) fn pattern(field: &Field, settings: &CellHologram, progress: &Progres
     let grid = field.grid;
     let columns = settings.cell.columns();
     let aperture = band::of_share(field, [1.0 / columns as f64, 1.0])?;
-    let (target, dropped) = band::limit(field, &aperture);
+    let (target, dropped) = band::limit(field, &aperture, progress)?;
     progress.advance(1);
     progress.check()?;
     let greatest = amplitude_at(&target, settings.percentile)?;

@@ -60,12 +60,12 @@ const TRIAL: usize = 512;
 
 pub(super) fn pattern(field: &Field, settings: &DoublePhase, progress: &Progress) -> Result<EncodedPattern> {
     let aperture = band::of_share(field, settings.band)?;
-    let (target, dropped) = band::limit(field, &aperture);
+    let (target, dropped) = band::limit(field, &aperture, progress)?;
     progress.advance(1);
     progress.check()?;
     let percentile = match settings.percentile {
         Some(percentile) => percentile,
-        None => best_percentile(&target, settings)?,
+        None => best_percentile(&target, settings, progress)?,
     };
     progress.check()?;
     let greatest = amplitude_at(&target, percentile)?;
@@ -124,7 +124,7 @@ fn phases(target: &Field, greatest: f64, interlace: Interlace) -> Vec<f32> {
 }
 
 /// The percentile with the least relative error in the band, after the best complex factor, on the panel's middle.
-fn best_percentile(target: &Field, settings: &DoublePhase) -> Result<f64> {
+fn best_percentile(target: &Field, settings: &DoublePhase, progress: &Progress) -> Result<f64> {
     let grid = target.grid;
     let (width, height) = (grid.width.min(TRIAL), grid.height.min(TRIAL));
     let (left, top) = ((grid.width - width) / 2, (grid.height - height) / 2);
@@ -133,7 +133,7 @@ fn best_percentile(target: &Field, settings: &DoublePhase) -> Result<f64> {
         (0..middle.len()).map(|i| target.samples[(top + i / width) * grid.width + left + i % width]).collect();
     let cut = Field::new(middle, target.wavelength, samples)?;
     let aperture = band::of_share(&cut, settings.band)?;
-    let (wanted, _) = band::limit(&cut, &aperture);
+    let (wanted, _) = band::limit(&cut, &aperture, progress)?;
     let mut best = (f64::INFINITY, PERCENTILES[0]);
     for percentile in PERCENTILES {
         let greatest = f64::from(amplitude_at(&wanted, percentile)?);
@@ -141,7 +141,7 @@ fn best_percentile(target: &Field, settings: &DoublePhase) -> Result<f64> {
             continue;
         }
         let shown = phases(&wanted, greatest, settings.interlace).into_iter().map(|p| Complex32::from_polar(1.0, p));
-        let (seen, _) = band::limit(&Field::new(middle, target.wavelength, shown.collect())?, &aperture);
+        let (seen, _) = band::limit(&Field::new(middle, target.wavelength, shown.collect())?, &aperture, progress)?;
         let overlap: Complex64 = wanted.samples.iter().zip(&seen.samples).map(|(a, b)| wide(a).conj() * wide(b)).sum();
         let error = 1.0 - overlap.norm_sqr() / (wanted.energy() * seen.energy()).max(f64::MIN_POSITIVE);
         if error < best.0 {

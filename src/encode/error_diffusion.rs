@@ -37,7 +37,7 @@ pub(super) fn pattern(
     progress: &Progress,
 ) -> Result<EncodedPattern> {
     let aperture = band::of_share(field, settings.band)?;
-    let (target, dropped) = band::limit(field, &aperture);
+    let (target, dropped) = band::limit(field, &aperture, progress)?;
     progress.advance(1);
     progress.check()?;
     let greatest = amplitude_at(&target, settings.percentile)?;

@@ -297,7 +297,7 @@ pub fn encode(
     let mut frame = driven.frame;
     let mut record = made.record;
     let seen = shown(&frame, settings.correction.as_ref(), &record)?;
-    let (efficiency, field_error, scale) = compare(&made.target, seen, &record);
+    let (efficiency, field_error, scale) = compare(&made.target, seen, &record, progress)?;
     record.scale = scale;
     frame.metadata.encoding = Some(record);
     let report = EncodeReport {
@@ -343,10 +343,13 @@ fn lit_pattern(
     }
     let mut incident = vec![Complex32::new(1.0, 0.0); field.samples.len()];
     illuminate(&mut incident, field.grid, field.wavelength, illumination)?;
-    let stopped = (settings.stop > 0.0).then(|| {
-        let all = Aperture::centered(f64::INFINITY, f64::INFINITY);
-        band::limit(field, &Aperture { stop: settings.stop, ..all })
-    });
+    let stopped = match settings.stop {
+        stop if stop > 0.0 => {
+            let all = Aperture::centered(f64::INFINITY, f64::INFINITY);
+            Some(band::limit(field, &Aperture { stop, ..all }, progress)?)
+        }
+        _ => None,
+    };
     let (kept, lost) = stopped.as_ref().map_or((field, 0.0), |(field, lost)| (field, *lost));
     let mut made = straight_pattern(kept, &settings.encoding, (profile, illumination, &incident), progress)?;
     if settings.stop > 0.0 {
@@ -442,9 +445,9 @@ fn shown(frame: &Frame, correction: Option<&Wavefront>, record: &EncodingRecord)
 }
 
 /// Efficiency, error within the band, and the modulus of ⟨u, g⟩/⟨u, u⟩ for the wanted u and the field g.
-fn compare(wanted: &Field, seen: Field, record: &EncodingRecord) -> (f64, f64, f64) {
+fn compare(wanted: &Field, seen: Field, record: &EncodingRecord, progress: &Progress) -> Result<(f64, f64, f64)> {
     let seen = match &record.aperture {
-        Some(aperture) => band::limit(&seen, aperture).0,
+        Some(aperture) => band::limit(&seen, aperture, progress)?.0,
         None => seen,
     };
     let product: Complex64 = wanted
@@ -456,7 +459,7 @@ fn compare(wanted: &Field, seen: Field, record: &EncodingRecord) -> (f64, f64, f
     let (uu, gg, count) = (wanted.energy(), seen.energy(), seen.samples.len() as f64);
     let efficiency = product.norm_sqr() / (uu * count);
     let error = (1.0 - product.norm_sqr() / (uu * gg)).max(0.0).sqrt();
-    (efficiency, error, product.norm() / uu)
+    Ok((efficiency, error, product.norm() / uu))
 }
 
 /// The amplitude below which a share `percentile` of the samples lies (1: the greatest).

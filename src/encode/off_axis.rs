@@ -189,7 +189,7 @@ pub(super) fn pattern(
         return Err(Error::parameter("reference_ratio", format!("{ratio} must be greater than zero")));
     }
     let Layout { carrier, band: aperture, mut warnings } = layout(field, settings, fringe)?;
-    let (target, dropped) = band::limit(field, &aperture);
+    let (target, dropped) = band::limit(field, &aperture, progress)?;
     progress.advance(1);
     progress.check()?;
     let amplitude = amplitude_at(&target, settings.percentile)?;

@@ -61,7 +61,7 @@ fn decoded(made: &EncodedPattern) -> Field {
     illuminate(&mut samples, grid, WAVELENGTH, made.record.illumination).expect("illumination");
     let field = Field::new(grid, WAVELENGTH, samples).expect("field");
     let mut field = match &made.record.aperture {
-        Some(aperture) => band::limit(&field, aperture).0,
+        Some(aperture) => band::limit(&field, aperture, &Progress::new()).expect("band").0,
         None => field,
     };
     for u in &mut field.samples {
@@ -155,7 +155,7 @@ fn illuminate_one(field: &mut Field, frequency: [f64; 2]) {
 fn strongest(field: &Field, count: usize) -> Vec<(i64, i64)> {
     let grid = field.grid;
     let mut spectrum = field.samples.clone();
-    crate::field::Fft2::new(grid.width, grid.height).forward(&mut spectrum);
+    crate::field::Fft2::new(grid.width, grid.height).forward(&mut spectrum, &Progress::new());
     let mut order: Vec<usize> = (0..spectrum.len()).collect();
     order.sort_by(|&a, &b| spectrum[b].norm_sqr().total_cmp(&spectrum[a].norm_sqr()));
     let cycles = |f: f64, extent: f64| (f * extent).round() as i64;
@@ -283,7 +283,8 @@ fn speckle(grid: Grid, share: f64) -> Field {
     let mut value = || Complex32::new(random.uniform_f32() - 0.5, random.uniform_f32() - 0.5);
     let samples = (0..grid.len()).map(|_| value()).collect();
     let field = Field::new(grid, WAVELENGTH, samples).expect("field");
-    band::limit(&field, &crate::propagation::Aperture::centered(share * grid.limit_x(), share * grid.limit_y())).0
+    let aperture = crate::propagation::Aperture::centered(share * grid.limit_x(), share * grid.limit_y());
+    band::limit(&field, &aperture, &Progress::new()).expect("band").0
 }
 
 #[test]
@@ -343,7 +344,7 @@ fn a_lee_grating_sends_a_tenth_of_the_light_into_its_first_order() {
     let settings = Simulation { subsamples: 3, illumination, ..Simulation::default() };
     let seen = simulate(&made.frame, &settings, &Progress::new()).expect("simulate");
     let mut spectrum = seen.samples.clone();
-    crate::field::Fft2::new(seen.grid.width, seen.grid.height).forward(&mut spectrum);
+    crate::field::Fft2::new(seen.grid.width, seen.grid.height).forward(&mut spectrum, &Progress::new());
     // A carrier of four pixels: 16 cycles over the panel, the object turned back by it.
     let order = spectrum[seen.grid.width - 16];
     let efficiency = f64::from(order.norm_sqr()) / (seen.grid.len() as f64).powi(2);

@@ -2,6 +2,7 @@
 //!
 //! Forward: U(k) = Σ u(n)·exp(−i2πkn/N), no factor. Inverse: exp(+i2πkn/N) and 1/(width·height). Row-major.
 
+use crate::progress::Progress;
 use num_complex::Complex;
 use rayon::prelude::*;
 use rustfft::{Fft, FftNum, FftPlanner};
@@ -29,6 +30,9 @@ const STRIP: usize = 16;
 /// A planned transform of one size, forward and inverse, usable from any number of threads.
 ///
 /// Memory: one copy of the samples while it runs. The same bits for any number of threads.
+///
+/// A transform that is asked to stop ends within a few rows or columns on each thread; the samples are then of no use, and
+/// the caller's next [`Progress::check`] fails.
 #[derive(Clone)]
 pub struct Fft2<T: FftNum> {
     width: usize,
@@ -50,16 +54,16 @@ impl<T: FftNum> Fft2<T> {
     }
 
     /// Σ u·exp(−i2π(…)), in place.
-    pub fn forward(&self, samples: &mut [Complex<T>]) {
-        self.rows(samples, 0, self.height);
-        self.columns(samples, |plan, _, strip, scratch| plan.column[0].process_with_scratch(strip, scratch));
+    pub fn forward(&self, samples: &mut [Complex<T>], progress: &Progress) {
+        self.rows(samples, 0, self.height, progress);
+        self.columns(samples, progress, |plan, _, strip, scratch| plan.column[0].process_with_scratch(strip, scratch));
     }
 
     /// (1/N) Σ u·exp(+i2π(…)), in place.
-    pub fn inverse(&self, samples: &mut [Complex<T>]) {
-        self.rows(samples, 1, self.height);
+    pub fn inverse(&self, samples: &mut [Complex<T>], progress: &Progress) {
+        self.rows(samples, 1, self.height, progress);
         let scale = self.scale();
-        self.columns(samples, |plan, _, strip, scratch| {
+        self.columns(samples, progress, |plan, _, strip, scratch| {
             plan.column[1].process_with_scratch(strip, scratch);
             for u in strip {
                 *u = u.scale(scale);
@@ -78,11 +82,15 @@ impl<T: FftNum> Fft2<T> {
         filled_rows: usize,
         wanted_rows: usize,
         transfer: impl Fn(usize, &mut [Complex<T>]) + Sync,
+        progress: &Progress,
     ) {
-        self.rows(samples, 0, filled_rows);
+        self.rows(samples, 0, filled_rows, progress);
         let scale = self.scale();
-        self.columns(samples, |plan, first, strip, scratch| {
+        self.columns(samples, progress, |plan, first, strip, scratch| {
             plan.column[0].process_with_scratch(strip, scratch);
+            if progress.stopped() {
+                return;
+            }
             for (i, column) in strip.chunks_exact_mut(plan.height).enumerate() {
                 transfer(first + i, column);
                 for u in column {
@@ -91,7 +99,7 @@ impl<T: FftNum> Fft2<T> {
             }
             plan.column[1].process_with_scratch(strip, scratch);
         });
-        self.rows(samples, 1, wanted_rows);
+        self.rows(samples, 1, wanted_rows, progress);
     }
 
     fn scale(&self) -> T {
@@ -99,14 +107,18 @@ impl<T: FftNum> Fft2<T> {
         T::one() / count
     }
 
-    fn rows(&self, samples: &mut [Complex<T>], direction: usize, rows: usize) {
+    fn rows(&self, samples: &mut [Complex<T>], direction: usize, rows: usize, progress: &Progress) {
         assert_eq!(samples.len(), self.width * self.height, "samples fit the planned size");
         let plan = &self.row[direction];
         let rows = &mut samples[..rows * self.width];
         // A task of several rows amortises its scratch; the split does not change any row's result.
         rows.par_chunks_mut(self.width * STRIP).for_each_init(
             || vec![Complex::new(T::zero(), T::zero()); plan.get_inplace_scratch_len()],
-            |scratch, rows| plan.process_with_scratch(rows, scratch),
+            |scratch, rows| {
+                if !progress.stopped() {
+                    plan.process_with_scratch(rows, scratch);
+                }
+            },
         );
     }
 
@@ -114,9 +126,13 @@ impl<T: FftNum> Fft2<T> {
     fn columns(
         &self,
         samples: &mut [Complex<T>],
+        progress: &Progress,
         work: impl Fn(&Self, usize, &mut [Complex<T>], &mut [Complex<T>]) + Sync,
     ) {
         let (width, height) = (self.width, self.height);
+        if progress.stopped() {
+            return;
+        }
         let zero = Complex::new(T::zero(), T::zero());
         let scratch = self.column.iter().map(|plan| plan.get_inplace_scratch_len()).max().unwrap_or(0);
         let mut turned = vec![zero; width * height];
@@ -124,6 +140,9 @@ impl<T: FftNum> Fft2<T> {
         turned.par_chunks_mut(height * STRIP).enumerate().for_each_init(
             || vec![zero; scratch],
             |scratch, (strip, columns)| {
+                if progress.stopped() {
+                    return;
+                }
                 let first = strip * STRIP;
                 for row in 0..height {
                     let from = row * width + first;
@@ -136,6 +155,9 @@ impl<T: FftNum> Fft2<T> {
         );
         let turned = &turned;
         samples.par_chunks_mut(width * STRIP).enumerate().for_each(|(block, rows)| {
+            if progress.stopped() {
+                return;
+            }
             let first = block * STRIP;
             let count = rows.len() / width;
             for column in 0..width {
@@ -153,6 +175,7 @@ mod tests {
     use super::*;
     use crate::field::{Complex32, Complex64, relative_error};
     use crate::random::Random;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     fn noise(n: usize) -> Vec<Complex64> {
         let mut random = Random::new(3, 0);
@@ -178,10 +201,10 @@ mod tests {
             let u = noise(width * height);
             let expected = naive(&u, width, height);
             let mut fast = u.clone();
-            Fft2::new(width, height).forward(&mut fast);
+            Fft2::new(width, height).forward(&mut fast, &Progress::new());
             assert!(relative_error(&fast, &expected) < 1e-13, "{width}×{height}");
             let mut single: Vec<Complex32> = u.iter().map(|u| Complex32::new(u.re as f32, u.im as f32)).collect();
-            Fft2::new(width, height).forward(&mut single);
+            Fft2::new(width, height).forward(&mut single, &Progress::new());
             // f32 rounding: about 6e-8·√log₂N at these sizes.
             assert!(relative_error(&single, &expected) < 1e-6, "{width}×{height} in f32");
         }
@@ -193,22 +216,48 @@ mod tests {
             let u = noise(width * height);
             let plan = Fft2::new(width, height);
             let mut there = u.clone();
-            plan.forward(&mut there);
+            let progress = Progress::new();
+            plan.forward(&mut there, &progress);
             for (k, u) in there.iter_mut().enumerate() {
                 *u *= Complex64::cis(0.1 * (k % width) as f64 - 0.3 * (k / width) as f64);
             }
-            plan.inverse(&mut there);
+            plan.inverse(&mut there, &progress);
             let mut filtered = u.clone();
-            plan.filter(&mut filtered, height, height, |kx, column| {
+            let turn = |kx: usize, column: &mut [Complex64]| {
                 for (ky, u) in column.iter_mut().enumerate() {
                     *u *= Complex64::cis(0.1 * kx as f64 - 0.3 * ky as f64);
                 }
-            });
+            };
+            plan.filter(&mut filtered, height, height, turn, &progress);
             assert!(relative_error(&filtered, &there) < 1e-13);
             let mut back = u.clone();
-            plan.forward(&mut back);
-            plan.inverse(&mut back);
+            plan.forward(&mut back, &progress);
+            plan.inverse(&mut back, &progress);
             assert!(relative_error(&back, &u) < 1e-13);
         }
+    }
+
+    #[test]
+    fn a_transform_that_is_asked_to_stop_begins_no_more_strips() {
+        let (width, height) = (320, 4096);
+        let plan = Fft2::new(width, height);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().expect("pool");
+        let (progress, columns) = (Progress::new(), AtomicUsize::new(0));
+        let mut u = noise(width * height);
+        // Asked in the third column: each of three threads may end the strip that it has begun.
+        let count = |_: usize, _: &mut [Complex64]| {
+            if columns.fetch_add(1, Ordering::Relaxed) == 2 {
+                progress.stop();
+            }
+        };
+        pool.install(|| plan.filter(&mut u, height, height, count, &progress));
+        let columns = columns.into_inner();
+        assert!((3..=3 * STRIP).contains(&columns), "{columns} columns of {width}");
+        // Asked before: nothing is done.
+        let before = u.clone();
+        plan.forward(&mut u, &progress);
+        plan.inverse(&mut u, &progress);
+        plan.filter(&mut u, height, height, |_, _| panic!("a column after the stop"), &progress);
+        assert_eq!(u, before);
     }
 }

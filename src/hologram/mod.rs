@@ -5,6 +5,7 @@
 //! why, in what time and memory; [`compute`] runs it.
 
 pub mod definition;
+mod dispersion;
 mod exact;
 #[cfg(feature = "gpu")]
 mod gpu;

@@ -285,7 +285,8 @@ fn band_limited(
                 modulate(values[row * width * cells + column]) - dead
             })
             .collect();
-        plan.forward(&mut pixels);
+        plan.forward(&mut pixels, progress);
+        progress.check()?;
         let weight_x = rectangle_spectrum(width, n, side, cells, cell_x);
         let weight_y = rectangle_spectrum(height, n, side, cells, cell_y);
         spectrum.par_chunks_mut(width * n).enumerate().for_each(|(ky, row)| {
@@ -296,7 +297,8 @@ fn band_limited(
         });
         progress.advance(1);
     }
-    fine.inverse(&mut spectrum);
+    fine.inverse(&mut spectrum, progress);
+    progress.check()?;
     spectrum.par_iter_mut().for_each(|u| *u += dead);
     Ok(spectrum)
 }

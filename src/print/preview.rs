@@ -321,7 +321,7 @@ impl Wave {
         let [cx, cy] = self.carrier;
         let rows: Vec<f64> = (0..padded.height).map(|k| padded.frequency_y(k)).collect();
         let highest = 1.0 / (self.wavelength * self.wavelength);
-        Fft2::new(padded.width, padded.height).filter(&mut field, input.height, output.height, |kx, column| {
+        let transfer = |kx: usize, column: &mut [Complex32]| {
             let fx = padded.frequency_x(kx);
             let true_x = fx + cx;
             if progress.stopped() || !(bands[0][0]..=bands[0][1]).contains(&true_x) {
@@ -339,7 +339,9 @@ impl Wave {
                 let factor = Complex64::cis(TAU * (turns - turns.round()));
                 *u *= Complex32::new(factor.re as f32, factor.im as f32);
             }
-        });
+        };
+        let transform = Fft2::new(padded.width, padded.height);
+        transform.filter(&mut field, input.height, output.height, transfer, progress);
         progress.check()?;
         let mut out = Vec::with_capacity(output.len());
         for row in field.chunks_exact(padded.width).take(output.height) {

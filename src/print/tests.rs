@@ -231,7 +231,7 @@ fn segments_see_truly_and_neighbours_send_the_same_points() {
 /// Low-frequency energy of the rounding error on the lattice of tiles, over that of its neighbours in the spectrum.
 fn lattice(error: &[f32], side: usize, tile: usize) -> f64 {
     let mut spectrum: Vec<Complex32> = error.iter().map(|&e| Complex32::new(e, 0.0)).collect();
-    Fft2::new(side, side).forward(&mut spectrum);
+    Fft2::new(side, side).forward(&mut spectrum, &Progress::new());
     let step = side / tile;
     // Frequencies of up to eight cycles a tile along one axis: rounding noise is weak there, seams are not.
     let (mut on, mut off) = ((0.0f64, 0), (0.0f64, 0));

@@ -145,7 +145,7 @@ impl<T: FftNum> Propagator<T> {
         let [x_band, y_band] = self.bands(wavelength, distance);
         let (grid, kernel, band_limit) = (&self.padded, self.settings.kernel, self.settings.band_limit);
         let rows: Vec<f64> = (0..grid.height).map(|k| grid.frequency_y(k)).collect();
-        self.transform.filter(&mut samples, self.input.height, self.output.height, |kx, column| {
+        let transfer = |kx: usize, column: &mut [Complex<T>]| {
             let fx = grid.frequency_x(kx);
             if progress.stopped() || band_limit && !(x_band[0]..=x_band[1]).contains(&fx) {
                 column.fill(zero);
@@ -160,7 +160,8 @@ impl<T: FftNum> Propagator<T> {
                 let (turns, decay) = turns_and_decay(kernel, wavelength, fx * fx + fy * fy, distance);
                 *u = *u * turned(turns + fx * shift[0] + fy * shift[1], decay);
             }
-        });
+        };
+        self.transform.filter(&mut samples, self.input.height, self.output.height, transfer, progress);
         progress.check()?;
         let mut out = Vec::with_capacity(self.output.len());
         for row in samples.chunks_exact(self.padded.width).take(self.output.height) {

@@ -2,6 +2,7 @@
 
 use crate::field::{Fft2, Field};
 use crate::panel::{EncodingRecord, Illumination};
+use crate::progress::Progress;
 use serde::Serialize;
 
 /// Shares of the light behind a panel; they add up to one. Simulated.
@@ -24,7 +25,7 @@ pub struct Orders {
 pub fn orders(behind: &Field, record: &EncodingRecord) -> Orders {
     let grid = behind.grid;
     let mut spectrum = behind.samples.clone();
-    Fft2::new(grid.width, grid.height).forward(&mut spectrum);
+    Fft2::new(grid.width, grid.height).forward(&mut spectrum, &Progress::new());
     let lit = match record.illumination {
         Illumination::Normal => Some([0.0, 0.0]),
         Illumination::Plane { frequency } => Some(frequency),
@@ -68,7 +69,6 @@ mod tests {
     use crate::encode::{EncodeSettings, Encoding, blaze_and_lens, encode};
     use crate::field::Complex32;
     use crate::panel::{PanelProfile, Simulation, simulate};
-    use crate::progress::Progress;
     use std::path::Path;
 
     fn panel(kind: &str, fill_factor: f64, response: &str) -> PanelProfile {

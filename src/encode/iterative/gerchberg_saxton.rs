@@ -88,7 +88,7 @@ pub fn gerchberg_saxton(
         return Err(Error::parameter("iterations", what));
     }
     let model = PanelModel::new(profile, wavelength, settings.illumination)?;
-    let problem = Problem::new(target, model.grid, wavelength, settings.padding)?;
+    let problem = Problem::new(target, model.grid, wavelength, settings.padding, progress)?;
     let count = model.grid.len();
     let mut wish = settings.start.phases(model.grid, wavelength)?;
     model.lit(&mut wish);
@@ -110,21 +110,24 @@ pub fn gerchberg_saxton(
     let mut asked: Vec<Vec<f32>> = wanted.iter().map(|plane| plane.amplitude.clone()).collect();
     progress.start("Gerchberg-Saxton", settings.iterations as u64);
     let mut light = model.light(&wish);
-    let mut judged = problem.judge(&light.total);
+    let mut judged = problem.judge(&light.total)?;
     let mut history = vec![judged.error];
     let (mut rejected, mut size) = (0, 1.0f32);
-    let mut change = projection.change(&judged, &mut asked, 1.0);
+    let mut change = projection.change(&judged, &mut asked, 1.0)?;
     for iteration in 0..settings.iterations {
         progress.check()?;
         let step = |i: usize| light.total[i] + change[i] * size;
-        let next: Vec<f32> =
-            (0..count).into_par_iter().map(|i| model.wish(i, step(i), wish[i], light.modulated[i])).collect();
+        let turned = |i: usize| {
+            if progress.stopped() { wish[i] } else { model.wish(i, step(i), wish[i], light.modulated[i]) }
+        };
+        let next: Vec<f32> = (0..count).into_par_iter().map(turned).collect();
+        progress.check()?;
         let next_light = model.light(&next);
-        let next_judged = problem.judge(&next_light.total);
+        let next_judged = problem.judge(&next_light.total)?;
         if next_judged.error <= judged.error {
             (wish, light, judged) = (next, next_light, next_judged);
             if iteration + 1 < settings.iterations {
-                change = projection.change(&judged, &mut asked, size);
+                change = projection.change(&judged, &mut asked, size)?;
             }
             size = f32::min(LONGEST, 1.2 * size);
         } else {
@@ -149,7 +152,7 @@ struct Projection<'a> {
 
 impl Projection<'_> {
     /// What the panel's light should change by. `size` tempers the weights' update.
-    fn change(&self, judged: &Judged, asked: &mut [Vec<f32>], size: f32) -> Vec<Complex32> {
+    fn change(&self, judged: &Judged, asked: &mut [Vec<f32>], size: f32) -> Result<Vec<Complex32>> {
         let scale = self.demand.unwrap_or(judged.scale as f32);
         let exponent = self.settings.weighting as f32 * size.min(1.0);
         let mut sum: Option<Vec<Complex32>> = None;
@@ -160,6 +163,9 @@ impl Projection<'_> {
                 Constraint::AmplitudeAndPhase => Some(plane.phasors(field)),
             };
             let each = |(i, (u, asked)): (usize, (&Complex32, &mut f32))| {
+                if self.problem.progress.stopped() {
+                    return Complex32::new(0.0, 0.0);
+                }
                 let weight = plane.weight.as_ref().map_or(1.0, |w| w[i]);
                 let (modulus, wish) = (u.norm_sqr().sqrt(), plane.amplitude[i]);
                 if exponent > 0.0 && wish > 0.0 && modulus > 0.0 {
@@ -176,13 +182,13 @@ impl Projection<'_> {
             };
             let change: Vec<Complex32> = field.par_iter().zip(asked.par_iter_mut()).enumerate().map(each).collect();
             // The change alone goes back: light beyond the window and in the free places stays as it is.
-            let back = self.problem.planes.adjoint(k, &change);
+            let back = self.problem.planes.adjoint(k, &change, self.problem.progress)?;
             match &mut sum {
                 None => sum = Some(back),
                 Some(sum) => sum.par_iter_mut().zip(&back).for_each(|(sum, u)| *sum += u),
             }
         }
-        sum.unwrap_or_default()
+        Ok(sum.unwrap_or_default())
     }
 }
 

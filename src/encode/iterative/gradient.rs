@@ -60,14 +60,14 @@ pub fn gradient_descent(
         return Err(Error::parameter("iterations", what));
     }
     let model = PanelModel::new(profile, wavelength, settings.illumination)?;
-    let problem = Problem::new(target, model.grid, wavelength, settings.padding)?;
+    let problem = Problem::new(target, model.grid, wavelength, settings.padding, progress)?;
     let mut wish = settings.start.phases(model.grid, wavelength)?;
     model.lit(&mut wish);
     progress.start("gradient descent", settings.iterations as u64);
     let mut light = model.light(&wish);
-    let mut judged = problem.judge(&light.total);
+    let mut judged = problem.judge(&light.total)?;
     let mut adam = Adam::new(wish.len());
-    adam.turn(&slopes(&model, &gradient_field(&problem, &judged), &light));
+    adam.turn(&slopes(&model, &gradient_field(&problem, &judged)?, &light));
     let mut history = vec![judged.error];
     let (mut rejected, mut trust) = (0, 1.0);
     for iteration in 0..settings.iterations {
@@ -75,13 +75,14 @@ pub fn gradient_descent(
         let share = iteration as f64 / settings.iterations as f64;
         let step = trust * settings.step * (0.05 + 0.95 * 0.5 * (1.0 + (std::f64::consts::PI * share).cos()));
         let next = adam.step(&wish, step as f32, model.range);
+        progress.check()?;
         let next_light = model.light(&next);
-        let next_judged = problem.judge(&next_light.total);
+        let next_judged = problem.judge(&next_light.total)?;
         if next_judged.error <= judged.error {
             (wish, light, judged) = (next, next_light, next_judged);
             trust = f64::min(1.0, 1.1 * trust);
             if iteration + 1 < settings.iterations {
-                adam.turn(&slopes(&model, &gradient_field(&problem, &judged), &light));
+                adam.turn(&slopes(&model, &gradient_field(&problem, &judged)?, &light));
             }
         } else {
             rejected += 1;
@@ -95,7 +96,7 @@ pub fn gradient_descent(
 }
 
 /// A*·∂L/∂U* on the panel's pixels, for L = Σw(s|U| − a)²/Σwa² or Σ|sU − T|²/Σ|T|².
-pub(super) fn gradient_field(problem: &Problem<'_>, judged: &Judged) -> Vec<Complex32> {
+pub(super) fn gradient_field(problem: &Problem<'_>, judged: &Judged) -> Result<Vec<Complex32>> {
     let (scale, factor) = (judged.scale as f32, (judged.scale / problem.norm) as f32);
     let mut sum: Option<Vec<Complex32>> = None;
     for (k, field) in judged.fields.iter().enumerate() {
@@ -115,13 +116,13 @@ pub(super) fn gradient_field(problem: &Problem<'_>, judged: &Judged) -> Vec<Comp
                 field.par_iter().zip(samples).map(|(u, t)| (u * scale - t) * factor).collect()
             }
         };
-        let back = problem.planes.adjoint(k, &pull);
+        let back = problem.planes.adjoint(k, &pull, problem.progress)?;
         match &mut sum {
             None => sum = Some(back),
             Some(sum) => sum.par_iter_mut().zip(&back).for_each(|(sum, u)| *sum += u),
         }
     }
-    sum.unwrap_or_default()
+    Ok(sum.unwrap_or_default())
 }
 
 /// ∂L/∂wish of all pixels.

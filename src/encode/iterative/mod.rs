@@ -20,6 +20,7 @@ pub use planes::Padding;
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Grid};
 use crate::panel::PhasePattern;
+use crate::progress::Progress;
 use crate::random::Random;
 use model::PanelModel;
 use planes::Planes;
@@ -151,6 +152,8 @@ struct Problem<'a> {
     planes: Planes,
     /// Σwa² over all planes, or Σ|T|².
     norm: f64,
+    /// Asked within each transform, which are the longest steps.
+    progress: &'a Progress,
 }
 
 /// A judged field.
@@ -164,7 +167,7 @@ struct Judged {
 }
 
 impl<'a> Problem<'a> {
-    fn new(target: &'a Target, grid: Grid, wavelength: f64, padding: Padding) -> Result<Self> {
+    fn new(target: &'a Target, grid: Grid, wavelength: f64, padding: Padding, progress: &'a Progress) -> Result<Self> {
         let count = grid.len();
         let refuse = |what: String| Err(Error::parameter("target", what));
         let (planes, norm) = match target {
@@ -185,7 +188,7 @@ impl<'a> Problem<'a> {
                 }
                 let depths: Vec<f64> = wanted.iter().map(|plane| plane.z).collect();
                 let norm: f64 = wanted.iter().map(|p| (0..count).map(|i| p.counted(i)).sum::<f64>()).sum();
-                (Planes::new(grid, wavelength, &depths, None, padding)?, norm)
+                (Planes::new(grid, wavelength, &depths, None, padding, progress)?, norm)
             }
             Target::Complex { samples, half } => {
                 if samples.len() != count || samples.iter().any(|u| !u.is_finite()) {
@@ -193,18 +196,19 @@ impl<'a> Problem<'a> {
                 }
                 let norm = samples.iter().map(|u| f64::from(u.norm_sqr())).sum();
                 // The band is defined on the panel's own transform, as the band filter of the encodings is.
-                (Planes::new(grid, wavelength, &[0.0], Some(*half), Padding::Periodic)?, norm)
+                (Planes::new(grid, wavelength, &[0.0], Some(*half), Padding::Periodic, progress)?, norm)
             }
         };
         if norm == 0.0 {
             return refuse("it is dark wherever it counts".into());
         }
-        Ok(Self { target, planes, norm })
+        Ok(Self { target, planes, norm, progress })
     }
 
     /// The light of a panel's field, with its best scale and error.
-    fn judge(&self, panel: &[Complex32]) -> Judged {
-        let fields: Vec<_> = (0..self.planes.count()).map(|k| self.planes.field(k, panel)).collect();
+    fn judge(&self, panel: &[Complex32]) -> Result<Judged> {
+        let field = |k: usize| self.planes.field(k, panel, self.progress);
+        let fields = (0..self.planes.count()).map(field).collect::<Result<Vec<_>>>()?;
         // ⟨|U|, a⟩, ⟨|U|, |U|⟩ over what counts, in row order on every machine.
         let (mut cross, mut own) = (0.0, 0.0);
         for (k, field) in fields.iter().enumerate() {
@@ -212,17 +216,21 @@ impl<'a> Problem<'a> {
                 .par_chunks(1 << 14)
                 .enumerate()
                 .map(|(chunk, field)| {
+                    if self.progress.stopped() {
+                        return (0.0, 0.0);
+                    }
                     let sums = field.iter().enumerate().map(|(i, u)| self.products(k, (chunk << 14) + i, *u));
                     sums.fold((0.0, 0.0), |sum, term| (sum.0 + term.0, sum.1 + term.1))
                 })
                 .collect();
+            self.progress.check()?;
             for part in parts {
                 cross += part.0;
                 own += part.1;
             }
         }
         let scale = if own > 0.0 { cross / own } else { 0.0 };
-        Judged { fields, scale, counted: own, error: (1.0 - scale * cross / self.norm).max(0.0) }
+        Ok(Judged { fields, scale, counted: own, error: (1.0 - scale * cross / self.norm).max(0.0) })
     }
 
     fn products(&self, k: usize, i: usize, u: Complex32) -> (f64, f64) {
@@ -282,7 +290,7 @@ impl Problem<'_> {
         history: Vec<f64>,
         rejected: usize,
     ) -> Result<Solution> {
-        let judged = self.judge(&model.light(wish).total);
+        let judged = self.judge(&model.light(wish).total)?;
         let phase = wish.par_iter().map(|&p| model.show(p).0.rem_euclid(TAU)).collect();
         let efficiency = judged.counted / (self.planes.count() * model.grid.len()) as f64;
         let psnr = self.psnr(&judged);

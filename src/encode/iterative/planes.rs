@@ -6,6 +6,7 @@
 
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Fft2, Grid};
+use crate::progress::Progress;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -43,6 +44,7 @@ impl Planes {
         depths: &[f64],
         half: Option<[f64; 2]>,
         padding: Padding,
+        progress: &Progress,
     ) -> Result<Self> {
         if depths.is_empty() || depths.iter().any(|z| !z.is_finite()) {
             return Err(Error::parameter("planes", format!("{depths:?} must be one or more finite depths")));
@@ -59,6 +61,9 @@ impl Planes {
                 let (limit_x, limit_y) = (limit(0), limit(1));
                 let mut transfer = vec![Complex32::new(0.0, 0.0); columns * rows];
                 transfer.par_chunks_mut(rows).enumerate().for_each(|(kx, column)| {
+                    if progress.stopped() {
+                        return;
+                    }
                     let fx = kx as f64 / padded.extent_x();
                     for (ky, h) in column.iter_mut().enumerate() {
                         let fy = ky as f64 / padded.extent_y();
@@ -73,6 +78,7 @@ impl Planes {
                 transfer
             })
             .collect();
+        progress.check()?;
         let transform = Fft2::new(padded.width, padded.height);
         Ok(Self { grid, width: padded.width, height: padded.height, transform, transfers })
     }
@@ -83,13 +89,13 @@ impl Planes {
     }
 
     /// The field on plane `k` of a field on the panel.
-    pub(super) fn field(&self, k: usize, panel: &[Complex32]) -> Vec<Complex32> {
-        self.through(k, panel, |u, h| *u *= h)
+    pub(super) fn field(&self, k: usize, panel: &[Complex32], progress: &Progress) -> Result<Vec<Complex32>> {
+        self.through(k, panel, |u, h| *u *= h, progress)
     }
 
     /// The adjoint: what a field on plane `k` is on the panel.
-    pub(super) fn adjoint(&self, k: usize, field: &[Complex32]) -> Vec<Complex32> {
-        self.through(k, field, |u, h| *u *= h.conj())
+    pub(super) fn adjoint(&self, k: usize, field: &[Complex32], progress: &Progress) -> Result<Vec<Complex32>> {
+        self.through(k, field, |u, h| *u *= h.conj(), progress)
     }
 
     fn through(
@@ -97,7 +103,9 @@ impl Planes {
         k: usize,
         field: &[Complex32],
         apply: impl Fn(&mut Complex32, Complex32) + Sync,
-    ) -> Vec<Complex32> {
+        progress: &Progress,
+    ) -> Result<Vec<Complex32>> {
+        progress.check()?;
         let (width, height, rows) = (self.width, self.height, self.height / 2 + 1);
         let transfer = &self.transfers[k];
         let mut samples = vec![Complex32::new(0.0, 0.0); width * height];
@@ -105,22 +113,24 @@ impl Planes {
             .par_chunks_mut(width)
             .zip(field.par_chunks(self.grid.width))
             .for_each(|(row, source)| row[..source.len()].copy_from_slice(source));
-        self.transform.filter(&mut samples, self.grid.height, self.grid.height, |kx, column| {
+        let multiply = |kx: usize, column: &mut [Complex32]| {
             let from = &transfer[kx.min(width - kx) * rows..][..rows];
             let (lower, upper) = column.split_at_mut(rows);
             lower.iter_mut().zip(from).for_each(|(u, h)| apply(u, *h));
             // Negative frequencies: ky and height − ky have one transfer.
             let mirrored = from[1..].iter().rev().skip(usize::from(height.is_multiple_of(2)));
             upper.iter_mut().zip(mirrored).for_each(|(u, h)| apply(u, *h));
-        });
+        };
+        self.transform.filter(&mut samples, self.grid.height, self.grid.height, multiply, progress);
+        progress.check()?;
         if width == self.grid.width {
-            return samples;
+            return Ok(samples);
         }
         let mut out = Vec::with_capacity(self.grid.len());
         for row in samples.chunks(width).take(self.grid.height) {
             out.extend_from_slice(&row[..self.grid.width]);
         }
-        out
+        Ok(out)
     }
 }
 
@@ -128,7 +138,6 @@ impl Planes {
 mod tests {
     use super::*;
     use crate::field::{Complex64, Field, relative_error};
-    use crate::progress::Progress;
     use crate::random::Random;
 
     fn noise(grid: Grid, seed: u64) -> Vec<Complex32> {
@@ -140,16 +149,16 @@ mod tests {
     fn planes_are_those_of_the_propagation_room_and_the_adjoint_is_one() {
         let grid = Grid::new(45, 32, 8e-6, 6e-6).expect("grid");
         let depths = [0.003, -0.002, 0.0];
-        let planes = Planes::new(grid, 532e-9, &depths, None, Padding::Dark).expect("planes");
+        let planes = Planes::new(grid, 532e-9, &depths, None, Padding::Dark, &Progress::new()).expect("planes");
         let panel = noise(grid, 1);
         for (k, &z) in depths.iter().enumerate() {
             let field = Field::new(grid, 532e-9, panel.clone()).expect("field");
             let expected = crate::propagation::propagate(&field, z, &Progress::new()).expect("propagate");
-            let seen = planes.field(k, &panel);
+            let seen = planes.field(k, &panel, &Progress::new()).expect("field");
             assert!(relative_error(&seen, &expected.samples) < 1e-5, "z = {z}");
             // ⟨A u, v⟩ = ⟨u, A* v⟩.
             let other = noise(grid, 2 + k as u64);
-            let back = planes.adjoint(k, &other);
+            let back = planes.adjoint(k, &other, &Progress::new()).expect("adjoint");
             let product = |a: &[Complex32], b: &[Complex32]| -> Complex64 {
                 a.iter()
                     .zip(b)
@@ -161,7 +170,7 @@ mod tests {
             let (left, right) = (product(&seen, &other), product(&panel, &back));
             assert!((left - right).norm() < 1e-5 * left.norm().max(1.0), "{left} {right}");
         }
-        assert!(Planes::new(grid, 532e-9, &[], None, Padding::Dark).is_err());
-        assert!(Planes::new(grid, 532e-9, &[f64::NAN], None, Padding::Dark).is_err());
+        assert!(Planes::new(grid, 532e-9, &[], None, Padding::Dark, &Progress::new()).is_err());
+        assert!(Planes::new(grid, 532e-9, &[f64::NAN], None, Padding::Dark, &Progress::new()).is_err());
     }
 }

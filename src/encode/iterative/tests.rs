@@ -5,6 +5,7 @@ use super::*;
 use crate::panel::PanelProfile;
 use crate::progress::Progress;
 use std::path::Path;
+use std::time::Instant;
 
 const WAVELENGTH: f64 = 532e-9;
 
@@ -44,11 +45,12 @@ fn analytic_slopes_equal_finite_differences() {
     let field = (0..grid.len()).map(|_| Complex32::new(random.uniform_f32(), random.uniform_f32())).collect();
     let half = [0.6 * grid.limit_x(), 0.8 * grid.limit_y()];
     for target in [Target::Amplitude(planes), Target::Complex { samples: field, half }] {
-        let problem = Problem::new(&target, grid, WAVELENGTH, Padding::Dark).expect("problem");
+        let progress = Progress::new();
+        let problem = Problem::new(&target, grid, WAVELENGTH, Padding::Dark, &progress).expect("problem");
         let phase = Start::Random { seed: 9 }.phases(grid, WAVELENGTH).expect("phases");
         let light = |phase: &[f32]| phase.iter().map(|&p| Complex32::from_polar(1.0, p)).collect::<Vec<_>>();
         let panel = light(&phase);
-        let pulled = gradient_field(&problem, &problem.judge(&panel));
+        let pulled = gradient_field(&problem, &problem.judge(&panel).expect("light")).expect("gradient");
         // Along the slopes themselves, each weighted at random, so that the difference stands well above the rounding of
         // single precision; five-point differences have an error of order h⁴.
         let slopes: Vec<f32> = pulled.iter().zip(&panel).map(|(g, u)| slope(*g, *u)).collect();
@@ -56,7 +58,7 @@ fn analytic_slopes_equal_finite_differences() {
         let direction: Vec<f32> = slopes.iter().map(|s| s / steepest * 2.0 * random.uniform_f32()).collect();
         let moved = |h: f32| {
             let phase: Vec<f32> = phase.iter().zip(&direction).map(|(p, d)| p + h * d).collect();
-            problem.judge(&light(&phase)).error
+            problem.judge(&light(&phase)).expect("light").error
         };
         let h = 2e-2f32;
         let measured = (8.0 * (moved(h) - moved(-h)) - (moved(2.0 * h) - moved(-2.0 * h))) / (12.0 * f64::from(h));
@@ -71,7 +73,8 @@ fn slopes_hold_with_crosstalk_dead_space_and_oblique_light() {
     (profile.crosstalk, profile.fill_factor, profile.bits) = (0.4, 0.9, 8);
     let grid = profile.grid().expect("grid");
     let target = Target::Amplitude(vec![picture(grid, 0.002, 4..20, 0.3)]);
-    let problem = Problem::new(&target, grid, WAVELENGTH, Padding::Dark).expect("problem");
+    let progress = Progress::new();
+    let problem = Problem::new(&target, grid, WAVELENGTH, Padding::Dark, &progress).expect("problem");
     let illumination = crate::panel::Illumination::Plane { frequency: [2e4, -1e4] };
     // Sixteen bits: a difference of phases must be seen through the levels.
     profile.bits = 16;
@@ -81,14 +84,15 @@ fn slopes_hold_with_crosstalk_dead_space_and_oblique_light() {
     let start: Vec<f32> =
         (0..grid.len()).map(|i| 3.0 + (0.4 * (i % 26) as f32).sin() + (0.3 * (i / 26) as f32).cos()).collect();
     let light = model.light(&start);
-    let slopes = gradient::slopes(&model, &gradient_field(&problem, &problem.judge(&light.total)), &light);
+    let judged = problem.judge(&light.total).expect("light");
+    let slopes = gradient::slopes(&model, &gradient_field(&problem, &judged).expect("gradient"), &light);
     let steepest = slopes.iter().fold(0.0, |a: f32, s| a.max(s.abs()));
     let moved = |h: f32| {
         // Away from the border, where the border's values going on is no adjoint of itself.
         let inside = |i: usize| (4..22).contains(&(i % 26)) && (4..15).contains(&(i / 26));
         let wish: Vec<f32> =
             (0..grid.len()).map(|i| start[i] + if inside(i) { h * slopes[i] / steepest } else { 0.0 }).collect();
-        problem.judge(&model.light(&wish).total).error
+        problem.judge(&model.light(&wish).total).expect("light").error
     };
     let inside = |i: &usize| (4..22).contains(&(i % 26)) && (4..15).contains(&(i / 26));
     let analytic: f64 =
@@ -135,5 +139,41 @@ fn one_plane_passes_35_and_three_planes_30_decibel_on_eight_bits() {
         let plain = GerchbergSaxton { weighting: 0.0, ..weighted.clone() };
         let found = gerchberg_saxton(target, &profile, WAVELENGTH, &plain, &Progress::new()).expect("plain");
         passes("plain", found, 15.0);
+    }
+}
+
+#[test]
+fn iterations_that_are_asked_to_stop_end_within_one() {
+    let profile = panel(800, 600, 256.0);
+    let grid = profile.grid().expect("grid");
+    let target = Target::Amplitude([0.1, 0.12].map(|z| picture(grid, z, 100..700, 0.3)).to_vec());
+    let descent = GradientDescent { iterations: 3, ..GradientDescent::default() };
+    let projections = GerchbergSaxton { iterations: 3, ..GerchbergSaxton::default() };
+    let run = |kind: usize, progress: &Progress| match kind {
+        0 => gradient_descent(&target, &profile, WAVELENGTH, &descent, progress),
+        _ => gerchberg_saxton(&target, &profile, WAVELENGTH, &projections, progress),
+    };
+    for kind in 0..2 {
+        let begin = Instant::now();
+        run(kind, &Progress::new()).expect("solution");
+        let whole = begin.elapsed();
+        // Asked when an iteration begins, whose transforms are most of what follows. The least of a few tries: the
+        // machine may be busy with something else for a while.
+        let after = (0..5).map(|_| {
+            let progress = Progress::new();
+            std::thread::scope(|scope| {
+                let worker = scope.spawn(|| run(kind, &progress));
+                while progress.snapshot().1 == 0 {
+                    std::thread::sleep(std::time::Duration::from_micros(200));
+                }
+                let asked = Instant::now();
+                progress.stop();
+                assert!(matches!(worker.join().expect("no panic"), Err(Error::Interrupted)));
+                asked.elapsed()
+            })
+        });
+        let least = after.min().expect("tries");
+        println!("kind {kind}: {whole:?}, {least:?} after the stop");
+        assert!(least < whole / 12, "{least:?} of {whole:?}");
     }
 }

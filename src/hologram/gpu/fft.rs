@@ -175,9 +175,9 @@ mod tests {
                 let mut wanted = exact.clone();
                 let fft = Fft2::new(width, height);
                 match direction {
-                    Direction::Forward => fft.forward(&mut wanted),
+                    Direction::Forward => fft.forward(&mut wanted, &Progress::new()),
                     Direction::Inverse => {
-                        fft.inverse(&mut wanted);
+                        fft.inverse(&mut wanted, &Progress::new());
                         wanted.iter_mut().for_each(|u| *u *= (width * height) as f64);
                     }
                 }

@@ -8,14 +8,15 @@
 //! ```
 //!
 //! summed over k and r, and transformed back. p_r gathers the powers u^r of the Legendre series
-//! e^{ixu} = Σ (2l + 1) i^l j_l(x) P_l(u) up to l = R − 1, u = d/h: the least error over a slab with even depths. ζ_k f_z is split as ζ_k S(f_x) + ζ_k (S(f_y) − 1/λ) + ζ_k/λ·C: the first
-//! two are reduced modulo one turn in f64, and C, written without cancellation, is small enough for f32.
+//! e^{ixu} = Σ (2l + 1) i^l j_l(x) P_l(u) up to l = R − 1, u = d/h: the least error over a slab with even depths.
+//! ζ_k f_z is split by column and row, with a small rest C: [`dispersion`](crate::hologram::dispersion).
 
 use super::slabs::legendre;
 use super::table::mean_square;
 use crate::error::Result;
 use crate::field::{Complex32, Field, Grid, plans, zeroed};
 use crate::hologram::definition::Optics;
+use crate::hologram::dispersion::{Column, Dispersion, aligned};
 use crate::hologram::lanes::{Aligned, InstructionSet, Lanes, cos_sin, dispatch};
 use crate::progress::Progress;
 use rayon::prelude::*;
@@ -52,13 +53,7 @@ struct Carrier {
 struct Shared {
     /// Where the taper is dark: largest λ²f² along each axis.
     limit: [f64; 2],
-    /// a = λ²f_x² by column of the transform.
-    columns: Vec<f64>,
-    /// b = λ²f_y² by row of the transform.
-    rows: Vec<f64>,
-    /// b and √(1 − b) for the inner loops.
-    squares: Aligned,
-    roots: Aligned,
+    dispersion: Dispersion,
     /// λ²·mean f² of each axis and 2πh/λ.
     mean: [f64; 2],
     kappa: f64,
@@ -85,23 +80,9 @@ impl Spectrum {
         let [width, height] = layout.size;
         let (rows, columns) = (plans(width), plans(height));
         let lambda = optics.wavelength;
-        let square = |axis: usize, k: usize| {
-            let n = layout.size[axis];
-            let signed = if k < n.div_ceil(2) { k as f64 } else { k as f64 - n as f64 };
-            (lambda * signed / (n as f64 * optics.pitch[axis])).powi(2)
-        };
-        let (mut squares, mut roots) = (aligned(height), aligned(height));
-        let by_row: Vec<f64> = (0..height).map(|k| square(1, k)).collect();
-        for (k, &b) in by_row.iter().enumerate() {
-            squares.values_mut()[k] = b as f32;
-            roots.values_mut()[k] = (1.0 - b).max(0.0).sqrt() as f32;
-        }
         let shared = Shared {
             limit: optics.taper.map(|taper| (lambda * taper.reach(5.0)).powi(2)),
-            columns: (0..width).map(|k| square(0, k)).collect(),
-            rows: by_row,
-            squares,
-            roots,
+            dispersion: Dispersion::new(layout.size, optics.pitch, lambda),
             mean: [0, 1].map(|axis| lambda * lambda * mean_square(optics, axis)),
             kappa: TAU * depth / lambda,
             set,
@@ -135,12 +116,7 @@ impl Spectrum {
         }
         progress.check()?;
         let ratio = distance / self.wavelength;
-        let mut rows = aligned(height);
-        for (row, &b) in rows.values_mut().iter_mut().zip(&self.shared.rows) {
-            let b = b.min(1.0);
-            let turns = -ratio * b / (1.0 + (1.0 - b).sqrt());
-            *row = (turns - turns.round()) as f32;
-        }
+        let rows = self.shared.dispersion.by_row(ratio, |_| 0.0);
         let carrier = Carrier { ratio, rows };
         let (layout, shared, plan, moments) = (&self.layout, &self.shared, &self.columns[0], &*moments);
         let dark = std::mem::replace(&mut self.dark, false);
@@ -166,7 +142,7 @@ impl Spectrum {
         self.sum.par_chunks_mut(stride * STRIP).enumerate().for_each_init(
             || vec![Complex32::default(); plan.get_inplace_scratch_len()],
             |scratch, (index, columns)| {
-                for (column, a) in columns.chunks_exact_mut(stride).zip(&shared.columns[index * STRIP..]) {
+                for (column, a) in columns.chunks_exact_mut(stride).zip(&shared.dispersion.columns[index * STRIP..]) {
                     if *a <= shared.limit[0] && !progress.stopped() {
                         plan.process_with_scratch(&mut column[..height], scratch);
                     }
@@ -207,12 +183,6 @@ fn wrap(index: usize, origin: i64, size: usize) -> usize {
     (index as i64 - origin).rem_euclid(size as i64) as usize
 }
 
-fn aligned(count: usize) -> Aligned {
-    let mut values = Aligned::default();
-    values.reserve(count);
-    values
-}
-
 /// Buffers of one thread for a strip of columns.
 struct Strip {
     /// Columns of each moment, [`STRIP`] of `height` + [`GAP`] each.
@@ -251,7 +221,7 @@ impl Strip {
         let [width, height] = layout.size;
         let stride = height + GAP;
         // Beyond its taper a column is dark, and its residual phase without bound.
-        let lit: [bool; STRIP] = std::array::from_fn(|i| shared.columns[first + i] <= shared.limit[0]);
+        let lit: [bool; STRIP] = std::array::from_fn(|i| shared.dispersion.columns[first + i] <= shared.limit[0]);
         for (moment, columns) in moments.iter().zip(&mut self.columns) {
             for row in 0..layout.painted {
                 let from = &moment[row * width + first..row * width + first + STRIP];
@@ -265,10 +235,8 @@ impl Strip {
             }
         }
         for i in (0..STRIP).filter(|&i| lit[i]) {
-            let a = shared.columns[first + i];
-            // ζ·S(f_x) in f64, reduced.
-            let turns = carrier.ratio * (1.0 - a).sqrt();
-            let base = (turns - turns.round()) as f32;
+            let a = shared.dispersion.columns[first + i];
+            let base = shared.dispersion.by_column(carrier.ratio, first + i, 0.0);
             let range = i * stride..i * stride + height;
             let moments: Vec<&[Complex32]> = self.columns.iter().map(|columns| &columns[range.clone()]).collect();
             let (moments, sum) = (&moments[..], &mut sum[range]);
@@ -293,24 +261,20 @@ impl Strip {
 /// The instruction set of `L` must be enabled; the columns have equal lengths, multiples of the lanes.
 #[inline(always)]
 unsafe fn prepare<L: Lanes>(shared: &Shared, a: f64, limit: f32, residual: &mut Aligned, amplitude: &mut Aligned) {
-    let (squares, roots) = (shared.squares.values(), shared.roots.values());
+    let (squares, roots) = (shared.dispersion.squares.values(), shared.dispersion.roots.values());
     let (residual, amplitude) = (residual.values_mut(), amplitude.values_mut());
     assert!(squares.len() == roots.len() && residual.len() == squares.len() && amplitude.len() == squares.len());
     let mut k = 0;
     // SAFETY: lengths were compared, and are multiples of sixteen by [`Aligned`].
     unsafe {
-        let one = L::splat(1.0);
-        let (va, root_a) = (L::splat(a as f32), L::splat((1.0 - a).sqrt() as f32));
-        let outer = one.div(one.add(root_a));
+        let column = Column::<L>::new(a);
         while k < squares.len() {
             let b = L::load(squares.as_ptr().add(k));
             let root_b = L::load(roots.as_ptr().add(k));
             // Both axes stay below the corner of [`Optics`], 0.93; more is dark, and only kept finite here.
-            let root = one.sub(va).sub(b).max(L::splat(0.01)).sqrt();
-            let sum = one.div(root.add(root_b)).add(outer);
-            let c = va.mul(b).mul(sum).div(one.add(root_b).mul(root.add(root_a)));
+            let (c, root) = column.residual(b, root_b);
             L::splat(0.0).sub(c).store(residual.as_mut_ptr().add(k));
-            let gain = root_a.mul(root_b).div(root).where_le(b, L::splat(limit));
+            let gain = column.root.mul(root_b).div(root).where_le(b, L::splat(limit));
             gain.store(amplitude.as_mut_ptr().add(k));
             k += L::COUNT;
         }
@@ -335,7 +299,7 @@ unsafe fn accumulate<L: Lanes>(
     dark: bool,
 ) {
     let count = sum.len();
-    let (squares, rows) = (shared.squares.values(), carrier.rows.values());
+    let (squares, rows) = (shared.dispersion.squares.values(), carrier.rows.values());
     let lengths = [residual.len(), amplitude.len(), squares.len(), rows.len()];
     assert!(count.is_multiple_of(16) && lengths.iter().all(|&n| n >= count));
     assert!(moments.iter().all(|moment| moment.len() == count));

@@ -52,7 +52,7 @@ fn simulated(frame: &Frame, subsamples: usize, faults: Faults) -> Field {
 fn efficiency(field: &Field, column: i64, row: i64) -> f64 {
     let (width, height) = (field.grid.width, field.grid.height);
     let mut spectrum = field.samples.clone();
-    Fft2::new(width, height).forward(&mut spectrum);
+    Fft2::new(width, height).forward(&mut spectrum, &Progress::new());
     let at = |k: i64, n: usize| k.rem_euclid(n as i64) as usize;
     // Row index runs against y.
     let u = spectrum[at(-row, height) * width + at(column, width)];
