@@ -56,3 +56,22 @@ impl Progress {
         (step, self.done.load(Ordering::Relaxed), self.total.load(Ordering::Relaxed))
     }
 }
+
+/// The least time of five from a stop, once the job has done something, to its end: the machine may be busy for a while.
+#[cfg(test)]
+pub(crate) fn least_time_to_stop<T>(run: impl Fn(&Progress) -> Result<T> + Sync) -> std::time::Duration {
+    let after = (0..5).map(|_| {
+        let progress = Progress::new();
+        std::thread::scope(|scope| {
+            let worker = scope.spawn(|| run(&progress).map(|_| ()));
+            while progress.snapshot().1 == 0 && !worker.is_finished() {
+                std::thread::sleep(std::time::Duration::from_micros(200));
+            }
+            let asked = std::time::Instant::now();
+            progress.stop();
+            assert!(matches!(worker.join().expect("no panic"), Err(Error::Interrupted)));
+            asked.elapsed()
+        })
+    });
+    after.min().unwrap_or_default()
+}

@@ -24,6 +24,20 @@ pub fn plans<T: FftNum>(length: usize) -> [Arc<dyn Fft<T>>; 2] {
     [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)]
 }
 
+/// The smallest `step`·2^a·3^b·5^c, times one of `others`, that is not below `least`: lengths that transforms are fast at.
+pub fn fast_length(least: usize, step: usize, others: &[usize]) -> usize {
+    let rest = |mut n: usize| {
+        for prime in [2, 3, 5] {
+            while n.is_multiple_of(prime) {
+                n /= prime;
+            }
+        }
+        n
+    };
+    let is_fast = |&m: &usize| others.contains(&rest(m));
+    (least.div_ceil(step).max(1)..).find(is_fast).map_or(least, |m| step * m)
+}
+
 /// Columns that one task transforms together: 16 columns of complex f32 are two cache lines a row.
 const STRIP: usize = 16;
 
@@ -193,6 +207,14 @@ mod tests {
                     .sum()
             })
             .collect()
+    }
+
+    #[test]
+    fn fast_lengths_have_no_other_primes() {
+        assert_eq!([7, 11, 13, 97, 2160].map(|n| fast_length(n, 1, &[1])), [8, 12, 15, 100, 2160]);
+        assert_eq!([7, 11, 13].map(|n| fast_length(n, 1, &[1, 7, 11])), [7, 11, 14]);
+        assert_eq!([0, 16, 17, 97].map(|n| fast_length(n, 16, &[1])), [16, 16, 32, 128]);
+        assert_eq!(fast_length(97, 16, &[1, 7]), 112);
     }
 
     #[test]

@@ -20,7 +20,7 @@
 
 use super::{Aperture, Settings, turned, turns_and_decay};
 use crate::error::{Error, Result};
-use crate::field::{Complex, Field, Grid, plans};
+use crate::field::{Complex, Field, Grid, fast_length, plans};
 use crate::progress::Progress;
 use rayon::prelude::*;
 use rustfft::{Fft, FftNum};
@@ -75,7 +75,7 @@ impl<T: FftNum> ScaledPropagator<T> {
             [(input.width, output.extent_x(), input.pitch_x), (input.height, output.extent_y(), input.pitch_y)].map(
                 |(size, extent, pitch)| {
                     let least = size + ((extent + 2.0 * guard) / pitch).ceil() as usize;
-                    (least..).find(|&n| smooth(n)).unwrap_or(least)
+                    fast_length(least, 1, &[1])
                 },
             );
         let forward = counts.map(|n| plans(n)[0].clone());
@@ -228,16 +228,6 @@ impl<T: FftNum> ScaledPropagator<T> {
     }
 }
 
-/// Whether n is a product of 2, 3 and 5.
-fn smooth(mut n: usize) -> bool {
-    for prime in [2, 3, 5] {
-        while n.is_multiple_of(prime) {
-            n /= prime;
-        }
-    }
-    n == 1
-}
-
 /// The transform of samples followed by zeros.
 fn spectrum<T: FftNum>(
     plan: &Arc<dyn Fft<T>>,
@@ -301,7 +291,7 @@ struct Chirp<T: FftNum> {
 impl<T: FftNum> Chirp<T> {
     fn new(range: &Range, m: usize, alpha: f64, scale: f64) -> Self {
         let least = range.count + m;
-        let length = (least..).find(|&n| smooth(n)).unwrap_or(least);
+        let length = fast_length(least, 1, &[1]);
         let plans = plans(length);
         // d² reaches 1e9 and α is below one: the product is exact to 1e-7 turns in f64 before it is reduced.
         let wave = |index: i64, sign: f64, scale: f64| {

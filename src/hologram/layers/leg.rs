@@ -8,7 +8,7 @@
 //! 3. rows that are wanted are transformed back, [`Leg::shutter`] and [`Leg::land`].
 
 use crate::error::Result;
-use crate::field::{Complex32, Field, Grid, plans, zeroed};
+use crate::field::{Complex32, Field, Grid, fast_length, plans, zeroed};
 use crate::hologram::definition::Optics;
 use crate::hologram::dispersion::{Column, Dispersion, aligned};
 use crate::hologram::lanes::{Aligned, InstructionSet, Lanes, cos_sin, dispatch};
@@ -71,7 +71,8 @@ impl Window {
             let tail = TAIL as f64 * optics.pitch[axis];
             let ends = self.middle[axis].abs() + self.half[axis] + cone + tail;
             let whole = 2.0 * self.half[axis] + guard(optics, distance);
-            even(((ends.min(whole) / optics.pitch[axis] - 1e-6).ceil() as usize).max(self.least[axis]))
+            let least = ((ends.min(whole) / optics.pitch[axis] - 1e-6).ceil() as usize).max(self.least[axis]);
+            fast_length(least, STRIP, &[1])
         })
     }
 
@@ -93,19 +94,6 @@ impl Window {
 /// Width of the soft edge [m].
 fn guard(optics: &Optics, distance: f64) -> f64 {
     GUARD * (optics.wavelength * distance.abs()).sqrt()
-}
-
-/// The next multiple of 16 whose transform is fast: no other primes than 2, 3 and 5.
-fn even(least: usize) -> usize {
-    let smooth = |mut n: usize| {
-        for prime in [2, 3, 5] {
-            while n.is_multiple_of(prime) {
-                n /= prime;
-            }
-        }
-        n == 1
-    };
-    STRIP * (least.div_ceil(STRIP)..).find(|&n| smooth(n)).unwrap_or(least)
 }
 
 /// Memory of all legs, whose transforms are at most of the given sizes [bytes].

@@ -21,7 +21,7 @@ use super::definition::Optics;
 use super::lanes::InstructionSet;
 use super::sources::{Source, tilt};
 use crate::error::Result;
-use crate::field::{Complex32, Field, Grid, zeroed};
+use crate::field::{Complex32, Field, Grid, fast_length, zeroed};
 use crate::progress::Progress;
 use paint::{Brush, Canvas, Patches, paint};
 use rayon::prelude::*;
@@ -215,28 +215,13 @@ pub(in crate::hologram) fn layout_of(
         let [low, high] = cloud.places[axis];
         let painted = high - low + 2.0 * halo + 2.0;
         let size = pixels.max(cloud.period[axis] + parameters.tail);
-        layout.size[axis] = transform_size(size.max(painted).ceil() as usize, others);
+        layout.size[axis] = fast_length(size.max(painted).ceil() as usize, 16, others);
         layout.origin[axis] = (low - halo).floor() as i64;
         if axis == 1 {
             layout.painted = (painted.ceil() as usize).min(layout.size[1]);
         }
     }
     layout
-}
-
-/// The smallest 16·2^a·3^b·5^c, times one of `others`, that is not below `n`: lengths that the transforms are fast at.
-fn transform_size(n: usize, others: &[usize]) -> usize {
-    (n.div_ceil(16)..)
-        .find(|&m| {
-            let mut rest = m;
-            for prime in [2, 3, 5] {
-                while rest.is_multiple_of(prime) {
-                    rest /= prime;
-                }
-            }
-            others.contains(&rest)
-        })
-        .map_or(n, |m| 16 * m)
 }
 
 /// What the phase of a point goes with by its depth from its plane [cycles/m]: the kernels carry exp(i2πd(α − ᾱ)) of
