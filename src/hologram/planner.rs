@@ -213,7 +213,7 @@ impl Job<'_> {
 }
 
 /// Taking and first touching the memory of a field's pixel, where the engine's model has not counted it [core-seconds].
-const FIELD_PIXEL: f64 = 4.5e-9;
+const FIELD_PIXEL: f64 = 4e-9;
 
 /// Slowness against AVX-512, measured.
 fn set_factor(settings: &HologramSettings, method: Method) -> f64 {

@@ -15,13 +15,15 @@
 mod leg;
 #[cfg(test)]
 mod tests;
+mod window;
 
 use super::definition::Optics;
 use super::lanes::InstructionSet;
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Field, Grid};
 use crate::progress::Progress;
-use leg::{Buffers, Leg, Light, Window};
+use leg::{Buffers, Leg, Light};
+use window::Window;
 
 /// Light on a plane parallel to the panel.
 #[derive(Clone, Debug, PartialEq)]
