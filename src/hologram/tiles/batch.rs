@@ -1,7 +1,10 @@
 //! The set-up of a batch of points on a tile, in whole vectors of f64: what kernels of factors start from.
 
-use super::kernel::{BATCH, Factor, Job, Limit, Relative, factor};
+use super::factor::{Factor, Job, Limit, Relative, factor};
 use super::shape::OVERSHOOT;
+
+/// Points of a batch: X of 32 columns and one block of Y stay in a first-level cache of 32 KB.
+pub(super) const BATCH: usize = 64;
 
 /// Points of a batch by quantity and axis, padded with dark ones.
 pub(super) struct Batch {
@@ -88,6 +91,29 @@ impl Batch {
             own(k).abs() * (1.0 + self.slope[axis][k].abs() * half) * overshoot
         };
         (0..BATCH).map(one).fold(0.0, f64::max)
+    }
+    /// The factor of a point along an axis; points beyond the last are dark.
+    #[inline(always)]
+    pub(super) fn factor<'a>(
+        &self,
+        job: &Job<'a>,
+        points: &[Relative],
+        k: usize,
+        axis: usize,
+        half: f64,
+    ) -> Factor<'a> {
+        let amplitude = if axis == 0 { self.amplitude[k] } else { 1.0 } as f32;
+        match points.get(k) {
+            Some(point) if self.edge[axis][k] > 0.0 => {
+                let mut found = self.tapered(job, point, k, axis, half);
+                found.amplitude = amplitude;
+                found
+            }
+            _ => {
+                let phase = [0, 1, 2, 3].map(|power: usize| self.waves[axis][power][k] / 65_536.0);
+                Factor::flat(phase, amplitude, self.slope[axis][k] as f32)
+            }
+        }
     }
     /// The factor of a point that the taper or the cut touches, term by term.
     #[inline(always)]

@@ -5,8 +5,9 @@
 //! ([`BFLOAT_NOISE`](super::shape::BFLOAT_NOISE)), each to its own size, so it does not matter how bright others are;
 //! sums are f32.
 
-use super::batch::Batch;
-use super::kernel::{BATCH, COLUMNS, Factor, Job, LONG_BATCH, Panels, Relative, evaluate};
+use super::batch::{BATCH, Batch};
+use super::factor::{Factor, Job, Relative, evaluate};
+use super::kernel::{COLUMNS, LONG_BATCH, Panels};
 use crate::hologram::lanes::Avx512;
 use crate::hologram::lanes::matrix::{BLOCK, SIDE, Unit};
 use std::arch::x86_64::*;
@@ -29,7 +30,7 @@ pub(super) unsafe fn add_batch<U: Unit>(job: &Job, points: &[Relative], panels: 
         for sixteen in 0..points.len().div_ceil(SIDE) {
             let block = part * BATCH / SIDE + sixteen;
             let factors = |axis: usize| -> [Factor; SIDE] {
-                std::array::from_fn(|i| factor(job, points, &batch, sixteen * SIDE + i, axis, half[axis]))
+                std::array::from_fn(|i| batch.factor(job, points, sixteen * SIDE + i, axis, half[axis]))
             };
             // SAFETY: count blocks of sixteen points for each vector of columns, twice for each of rows, as asserted.
             unsafe {
@@ -75,23 +76,6 @@ pub(super) unsafe fn add_batch<U: Unit>(job: &Job, points: &[Relative], panels: 
             }
         }
         U::end();
-    }
-}
-
-/// A point's factor along an axis; points beyond the last are dark.
-#[inline(always)]
-fn factor<'a>(job: &Job<'a>, points: &[Relative], batch: &Batch, k: usize, axis: usize, half: f64) -> Factor<'a> {
-    let amplitude = if axis == 0 { batch.amplitude[k] } else { 1.0 } as f32;
-    match points.get(k) {
-        Some(point) if batch.edge[axis][k] > 0.0 => {
-            let mut found = batch.tapered(job, point, k, axis, half);
-            found.amplitude = amplitude;
-            found
-        }
-        _ => {
-            let phase = [0, 1, 2, 3].map(|power: usize| batch.waves[axis][power][k] / 65_536.0);
-            Factor::flat(phase, amplitude, batch.slope[axis][k] as f32)
-        }
     }
 }
 

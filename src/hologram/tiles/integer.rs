@@ -8,9 +8,10 @@
 //! Sums do not overflow: they are taken modulo 2³², where P₁, P₂ and P₃ may wrap, but |re|, |im| ≤ Σ|x||y| ≤
 //! [`BATCH`]·[`LARGEST`]² < 2³¹, so what the differences leave modulo 2³² is the value itself.
 
-use super::batch::Batch;
+use super::batch::{BATCH, Batch};
+use super::factor::{self, Factor, Job, Relative};
 use super::fixed::{FULL, Indexes, LONGEST, Strength, UNIT, Wave, evaluate, pair};
-use super::kernel::{self, BATCH, COLUMNS, Factor, Job, Panels, ROWS, Relative, stride};
+use super::kernel::{COLUMNS, Panels, ROWS, stride};
 use crate::hologram::lanes::Avx512;
 use std::arch::x86_64::*;
 
@@ -145,7 +146,7 @@ unsafe fn rounded(factor: &Option<Factor>, u: __m512) -> (__m512i, __m512i) {
     match factor {
         Some(factor) => {
             // SAFETY: the caller's promise.
-            let (re, im) = unsafe { kernel::evaluate(factor, Avx512(u)) };
+            let (re, im) = unsafe { factor::evaluate(factor, Avx512(u)) };
             (_mm512_cvtps_epi32(re.0), _mm512_cvtps_epi32(im.0))
         }
         None => (_mm512_setzero_si512(), _mm512_setzero_si512()),

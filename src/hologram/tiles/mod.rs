@@ -10,11 +10,11 @@
 //!
 //! The engines `direct` and `tiles` are this one, with tiles small enough for 1e-4, or for the error that was asked.
 
-#[cfg(target_arch = "x86_64")]
 mod batch;
 #[cfg(target_arch = "x86_64")]
 mod bfloat;
 mod edge;
+mod factor;
 #[cfg(target_arch = "x86_64")]
 mod fixed;
 #[cfg(target_arch = "x86_64")]
@@ -24,7 +24,7 @@ mod pixels;
 mod shape;
 
 pub(crate) use edge::EdgeTable;
-pub(crate) use kernel::{Axis, Limit, taper};
+pub(crate) use factor::{Axis, Limit, taper};
 pub(crate) use shape::{Kernel, Products, Shape};
 
 use super::Cull;
@@ -36,7 +36,8 @@ use super::sources::{Source, contrast, tilt};
 use crate::error::Result;
 use crate::field::{Complex32, Field, Grid};
 use crate::progress::Progress;
-use kernel::{Job, LONG_BATCH, Panels, Relative, add_batch};
+use factor::{Job, Relative};
+use kernel::{LONG_BATCH, Panels, add_batch};
 use pixels::add_exact;
 use rayon::prelude::*;
 use shape::Seen;

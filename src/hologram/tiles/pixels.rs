@@ -1,6 +1,7 @@
 //! The inner loop where the sphere is not separable over a tile: every pixel from its own path.
 
-use super::kernel::{Axis, COLUMNS, Job, Limit, Panels, Relative, taper};
+use super::factor::{Axis, Job, Limit, Relative, taper};
+use super::kernel::{COLUMNS, Panels};
 use crate::hologram::lanes::{Lanes, cos_sin};
 
 /// Adds a batch of points to the tile pixel by pixel, with the exact path: for angles and distances at which the

@@ -162,7 +162,7 @@ impl Shape {
         let (width, height) = (self.width as f64, self.height as f64);
         match self.kernel {
             Kernel::Paths => height * (4e-8 + width * 1.4e-9),
-            Kernel::Float => 4.3e-8 + 6.5e-10 * (width + height) + width * height * FLOAT_PAIR,
+            Kernel::Float => 3.5e-8 + 6.5e-10 * (width + height) + width * height * FLOAT_PAIR,
             Kernel::Integer => 2e-8 + 4e-10 * (width + height) + width * height * INTEGER_PAIR,
             Kernel::Bfloat => 2e-8 + 4e-10 * (width + height) + width * height * BFLOAT_PAIR,
         }

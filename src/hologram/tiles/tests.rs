@@ -1,6 +1,7 @@
 //! Products in integers and in bfloat16: against f32 on one tile, and against the oracle as fields.
 
-use super::kernel::{BATCH, COLUMNS, ROWS};
+use super::batch::BATCH;
+use super::kernel::{COLUMNS, ROWS};
 use super::shape::{BFLOAT_NOISE, INTEGER_NOISE, OVERSHOOT};
 use super::*;
 use crate::field::{Complex64, relative_error};
