@@ -32,6 +32,16 @@ pub enum Error {
         /// The value that was given, the limit that it broke, and what to do.
         what: String,
     },
+    /// A number or size lies outside the domain of its setting.
+    #[error("{name}: {value} {limit}")]
+    OutOfRange {
+        /// The setting's name.
+        name: &'static str,
+        /// The value that was given, as it is written.
+        value: String,
+        /// The domain that it lies outside of, as the predicate of a sentence: `must be 1 to 256`.
+        limit: String,
+    },
     /// The grid is too coarse for the wave that was asked for.
     #[error(
         "{what}: spatial frequency {frequency:.6e} cycles/m passes the grid's limit {limit:.6e} (half a cycle per {pitch:.4e} m pixel); {hint}"
@@ -100,6 +110,11 @@ impl Error {
     /// A setting outside its domain.
     pub fn parameter(name: &'static str, what: impl Into<String>) -> Self {
         Self::Parameter { name, what: what.into() }
+    }
+    /// A value outside the domain of its setting; `limit` is the predicate of the sentence that the value begins: `must be 1
+    /// to 256`.
+    pub fn out_of_range(name: &'static str, value: impl std::fmt::Display, limit: impl Into<String>) -> Self {
+        Self::OutOfRange { name, value: value.to_string(), limit: limit.into() }
     }
     /// Correct input that cannot be handled here.
     pub fn unsupported(what: impl Into<String>) -> Self {
