@@ -1,12 +1,12 @@
 //! Three holograms from one trace: fields, frames and pictures in red, green and blue.
 
 use super::args::{ComputeArgs, ShowArgs};
-use super::commands::{content, origin, report_field, seen_half};
+use super::commands::{content, origin, report_field};
 use super::encoding::encode_field;
 use super::light::report_gamut;
 use super::load::{Panel, Points, hologram_settings};
 use super::report::Report;
-use super::show::{focus_step, planes_of, report_likeness, report_pictures};
+use super::show::{report_likeness, report_pictures};
 use glam::DVec2;
 use holodrive::field::npy::{self, CONVENTION, Content};
 use holodrive::hologram::HologramSettings;
@@ -16,7 +16,7 @@ use holodrive::pipeline::{self, ColorFields, Lit};
 use holodrive::points::colour::{Lasers, NAMES};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::colour::laser_powers;
-use holodrive::reconstruction::{ColorLight, ColorPicture, View, write_rgb_png};
+use holodrive::reconstruction::{self, ColorLight, ColorPicture, View, write_rgb_png};
 use holodrive::units::show_length;
 use holodrive::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -192,9 +192,9 @@ pub(super) fn look(
         return Err(Error::input(&args.input, "has no light for any of the lasers"));
     };
     let Some(lit) = lit else {
-        for (name, z) in planes_of(content) {
+        for (name, z) in reconstruction::planes_of(content.depth) {
             let view = View::Plane { z };
-            let half = seen_half(first, &view, content.eye);
+            let half = view.seen_half(&first.grid, content.eye);
             // One cell a pixel of the panel.
             let cells = |half: f64, pitch: f64| (2.0 * half / pitch).ceil() as usize;
             let size = (cells(half.x, first.grid.pitch_x), cells(half.y, first.grid.pitch_y));
@@ -214,7 +214,7 @@ pub(super) fn look(
         .fields
         .iter()
         .flatten()
-        .map(|(field, settings)| focus_step(field, settings, half_at(near), size))
+        .map(|(field, settings)| reconstruction::focus_step(field, settings, half_at(near), size))
         .fold(f64::INFINITY, f64::min);
     let (sharp, planes) = behind.all_in_focus(&lit.view.depths, size, half_at, step, progress)?;
     let likeness = sharp.likeness(&target, white);

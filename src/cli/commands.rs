@@ -8,7 +8,7 @@ use super::light::report_gamut;
 use super::load::{Input, channel, depth_scale, hologram_settings, input, load_points, panel_in_color, placed_by};
 use super::report::{Report, seconds};
 use glam::DVec2;
-use holodrive::field::{Field, npy};
+use holodrive::field::npy;
 use holodrive::hologram::Computed;
 use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Faults, Frame, PanelProfile, wavefront};
@@ -228,7 +228,7 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
         (_, _, Some(distance)) => View::Plane { z: depth(distance, content.depth)? - content.z },
         _ => return Err(Error::parameter("distance", "give --distance, or --eye with --focus")),
     };
-    let half = args.half.map_or_else(|| seen_half(&field, &view, content.eye), |[x, y]| DVec2::new(x, y));
+    let half = args.half.map_or_else(|| view.seen_half(&field.grid, content.eye), |[x, y]| DVec2::new(x, y));
     let begin = Instant::now();
     if let (Some(views), Some(eye_box)) = (args.views, args.eye_box) {
         return super::parallax::views(args, (&field, &settings), &view, half, (views, eye_box), &bar.progress, report);
@@ -262,19 +262,6 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
     );
     report.add("output", args.output.display().to_string(), format!("picture      {}", args.output.display()));
     Ok(report)
-}
-
-/// What is seen through the panel: its own half size, widened behind it as an eye sees it.
-pub(super) fn seen_half(field: &Field, view: &View, eye: Option<[f64; 3]>) -> DVec2 {
-    let half = 0.5 * DVec2::new(field.grid.extent_x(), field.grid.extent_y());
-    let distance = match *view {
-        View::Eye { position, .. } => Some(position[2]),
-        View::Plane { .. } => eye.map(|eye| eye[2]),
-    };
-    match distance {
-        Some(eye) if eye > 0.0 && view.focus() < eye => half * ((eye - view.focus()) / eye),
-        _ => half,
-    }
 }
 
 /// Writes a reconstruction as .png (shown) or .npy (linear).

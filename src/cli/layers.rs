@@ -5,13 +5,11 @@ use super::colour::named;
 use super::load::{Input, Panel, channel, depth_scale, placed_by};
 use super::report::{Report, seconds};
 use holodrive::field::npy::{self, Content};
-use holodrive::field::{Complex32, Field};
-use holodrive::hologram::layers::{self, Layer};
+use holodrive::hologram::layers::{self, SliceSettings};
 use holodrive::points::colour::NAMES;
 use holodrive::points::images::{RgbDepth, Window};
 use holodrive::points::slices::{Light, Slices};
 use holodrive::progress::Progress;
-use holodrive::random::Random;
 use holodrive::units::show_length;
 use holodrive::{Error, Result};
 use std::time::Instant;
@@ -44,6 +42,7 @@ pub(super) fn compute(
             return Err(Error::parameter("phase", "path is for scenes; use zero or random with a picture"));
         }
     };
+    let settings = SliceSettings { occlude: !args.see_through, random_phase: seed, memory: args.hologram.memory };
     let lights: Vec<(f64, Light)> = match &panel.lasers {
         None => vec![(panel.wavelength, Light::Channel(channel(&args.hologram)))],
         Some(lasers) => (0..3).map(|i| (lasers.wavelengths()[i], Light::Laser(lasers, i))).collect(),
@@ -51,8 +50,7 @@ pub(super) fn compute(
     let colored = lights.len() > 1;
     for (i, (wavelength, light)) in lights.into_iter().enumerate() {
         let begin = Instant::now();
-        let (field, lit) =
-            field(&slices, light, wavelength, (args.hologram.memory, seed, !args.see_through), panel, progress)?;
+        let (field, lit) = layers::of_slices(&slices, light, &panel.grid, wavelength, &settings, progress)?;
         let mut own = Report::new("compute");
         let part = if colored { &mut own } else { &mut *report };
         part.add("wavelength", wavelength, "");
@@ -82,47 +80,4 @@ pub(super) fn compute(
         }
     }
     Ok(())
-}
-
-/// The field in one colour of light, and the number of lit samples.
-fn field(
-    slices: &Slices,
-    light: Light,
-    wavelength: f64,
-    (memory, seed, occlude): (u64, Option<u64>, bool),
-    panel: &Panel,
-    progress: &Progress,
-) -> Result<(Field, usize)> {
-    let needed =
-        slices.bytes() + layers::bytes(&slices.lattice, &panel.grid, wavelength, slices.depths().iter().copied())?;
-    if needed > memory {
-        let hint = "give more memory or fewer layers".to_owned();
-        return Err(Error::Memory { what: "layers", needed: needed.div_ceil(1 << 20), budget: memory >> 20, hint });
-    }
-    let mut lit = 0;
-    let mut all = Vec::new();
-    for index in 0..slices.depths().len() {
-        progress.check()?;
-        let slice = slices.slice(index, light);
-        let phase = |i: usize| match seed {
-            Some(seed) => Random::new(seed, ((index as u64) << 40) + i as u64).phase(),
-            None => 0.0,
-        };
-        let wave = |(i, &a): (usize, &f32)| {
-            if a == 0.0 {
-                return Complex32::default();
-            }
-            let (sin, cos) = phase(i).sin_cos();
-            Complex32::new(a * cos as f32, a * sin as f32)
-        };
-        lit += slice.amplitudes.iter().filter(|a| **a > 0.0).count();
-        let samples = slice.amplitudes.iter().enumerate().map(wave).collect();
-        let opaque = if occlude && slice.covered.contains(&true) { slice.covered } else { Vec::new() };
-        all.push(Layer { z: slice.z, light: samples, opaque });
-    }
-    if lit == 0 {
-        return Err(Error::parameter("input", "is black everywhere in this light, so it makes no field"));
-    }
-    let field = layers::compute(&all, &slices.lattice, &panel.grid, wavelength, memory, progress)?;
-    Ok((field, lit))
 }

@@ -2,7 +2,7 @@
 
 use super::args::{RawFormatArg, ShowArgs};
 use super::bar::Bar;
-use super::commands::{depth, seen_half};
+use super::commands::depth;
 use super::load;
 use super::report::{Report, count, seconds};
 #[cfg(feature = "display")]
@@ -226,7 +226,7 @@ fn look(args: &ShowArgs, frame: &Frame, progress: &Progress) -> Result<Picture> 
         None => content.map_or(0.0, |[near, far]| 0.5 * (near + far)),
     };
     let view = View::Plane { z };
-    let half = seen_half(&field, &view, None);
+    let half = view.seen_half(&field.grid, None);
     let size = (CELL, ((CELL as f64 * half.y / half.x).round() as usize).clamp(1, 4 * CELL));
     reconstruction::picture(&field, &view, half, size, &settings, &progress.part())
 }

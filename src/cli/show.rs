@@ -3,12 +3,11 @@
 use super::args::{ShowArgs, White};
 use super::bar::Bar;
 use super::colour;
-use super::commands::{content, origin, report_field, seen_half, write_traced, write_view};
+use super::commands::{content, origin, report_field, write_traced, write_view};
 use super::encoding::encode_field;
 use super::load::{self, Input, Panel, Points, channel, hologram_settings, load_points, luminance_picture};
 use super::report::{Report, count, seconds};
 use super::sequence;
-use glam::DVec2;
 use holodrive::field::Field;
 use holodrive::field::npy::{self, Content};
 use holodrive::panel::simulated::Simulation;
@@ -17,7 +16,7 @@ use holodrive::pipeline::{self, Lit};
 use holodrive::points::colour::Lasers;
 use holodrive::points::ply;
 use holodrive::progress::Progress;
-use holodrive::reconstruction::{self, Picture, Scale, View, ViewSettings, metrics};
+use holodrive::reconstruction::{self, Picture, Scale, View, metrics};
 use holodrive::units::show_length;
 use holodrive::{Error, Result, files};
 use std::path::Path;
@@ -252,9 +251,9 @@ fn look(
     let (field, mut settings) = pipeline::simulated_light(frame, &Simulation::default(), progress)?;
     settings.block_zero_order(args.zero_order_stop, field.wavelength);
     let Some(lit) = lit else {
-        for (name, z) in planes_of(content) {
+        for (name, z) in reconstruction::planes_of(content.depth) {
             let view = View::Plane { z };
-            let half = seen_half(&field, &view, content.eye);
+            let half = view.seen_half(&field.grid, content.eye);
             let (grid, values) = reconstruction::intensity(&field, &view, half, &settings, progress)?;
             let picture = Picture { width: grid.width, height: grid.height, values };
             write_view(
@@ -274,7 +273,7 @@ fn look(
     let target = luminance_picture(lit);
     let white = lit.exposed.white;
 
-    let step = focus_step(&field, &settings, half_at(content.depth.map_or(0.0, |d| d[0])), size);
+    let step = reconstruction::focus_step(&field, &settings, half_at(content.depth.map_or(0.0, |d| d[0])), size);
     let (sharp, planes) =
         reconstruction::all_in_focus(&field, &lit.view.depths, size, half_at, step, &settings, progress)?;
     let likeness = metrics::likeness(&sharp, &target, white);
@@ -327,24 +326,4 @@ pub(super) fn report_likeness(likeness: &metrics::Likeness, what: &str, planes: 
 pub(super) fn report_pictures(begin: Instant, report: &mut Report) {
     let elapsed = begin.elapsed().as_secs_f64();
     report.add("reconstruction_seconds", elapsed, format!("pictures     {:>8}", seconds(elapsed)));
-}
-
-/// Planes to look at when nothing but the depth range is known.
-pub(super) fn planes_of(content: &Content) -> Vec<(&'static str, f64)> {
-    match content.depth {
-        Some([near, far]) if (near - far).abs() > 1e-6 => {
-            vec![("near", near), ("middle", 0.5 * (near + far)), ("far", far)]
-        }
-        Some([near, _]) => vec![("near", near)],
-        None => vec![("panel", 0.0)],
-    }
-}
-
-/// Distance of planes at which defocus blurs by at most one cell of the picture between them: cell / tan θ, with θ the
-/// half angle of the light's cone, sin θ = λ·f_max.
-pub(super) fn focus_step(field: &Field, settings: &ViewSettings, half: DVec2, size: (usize, usize)) -> f64 {
-    let cell = (2.0 * half.x / size.0 as f64).min(2.0 * half.y / size.1 as f64);
-    let frequency = settings.aperture.map_or(field.grid.limit_x(), |a| a.half[0].max(a.half[1]));
-    let sine = (field.wavelength * frequency).clamp(1e-6, 0.9);
-    cell / (sine / (1.0 - sine * sine).sqrt())
 }

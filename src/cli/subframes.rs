@@ -5,7 +5,6 @@ use super::commands::{content, origin, report_field, write_view};
 use super::encoding::encode_field;
 use super::load::{Panel, Points, channel, hologram_settings};
 use super::report::Report;
-use super::show::planes_of;
 use holodrive::field::npy;
 use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Frame, Origin};
@@ -82,7 +81,7 @@ pub(super) fn look(
     progress: &Progress,
     report: &mut Report,
 ) -> Result<()> {
-    let planes = planes_of(content);
+    let planes = reconstruction::planes_of(content.depth);
     let mut seen: Vec<Vec<Picture>> = planes.iter().map(|_| Vec::new()).collect();
     let mut view = None;
     for frame in frames {
@@ -90,7 +89,7 @@ pub(super) fn look(
         settings.block_zero_order(args.zero_order_stop, field.wavelength);
         for ((_, z), seen) in planes.iter().zip(&mut seen) {
             let at = View::Plane { z: *z };
-            let half = super::commands::seen_half(&field, &at, content.eye);
+            let half = at.seen_half(&field.grid, content.eye);
             let (grid, values) = reconstruction::intensity(&field, &at, half, &settings, progress)?;
             seen.push(Picture { width: grid.width, height: grid.height, values });
             view = Some((at, half));

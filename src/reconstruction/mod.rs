@@ -49,6 +49,31 @@ impl View {
             Self::Eye { focus, .. } => focus,
         }
     }
+
+    /// Half size [m] of what is seen through a panel in the plane of focus: the panel's own, widened behind it (and
+    /// narrowed in front of it) along the rays of an eye. A view on a plane has the eye that it is given, if any.
+    pub fn seen_half(&self, panel: &Grid, eye: Option<[f64; 3]>) -> DVec2 {
+        let half = 0.5 * DVec2::new(panel.extent_x(), panel.extent_y());
+        let distance = match *self {
+            Self::Eye { position, .. } => Some(position[2]),
+            Self::Plane { .. } => eye.map(|eye| eye[2]),
+        };
+        match distance {
+            Some(eye) if eye > 0.0 && self.focus() < eye => half * ((eye - self.focus()) / eye),
+            _ => half,
+        }
+    }
+}
+
+/// Planes to look at, with their names, where no more is known than the range of depths z [m].
+pub fn planes_of(depth: Option<[f64; 2]>) -> Vec<(&'static str, f64)> {
+    match depth {
+        Some([near, far]) if (near - far).abs() > 1e-6 => {
+            vec![("near", near), ("middle", 0.5 * (near + far)), ("far", far)]
+        }
+        Some([near, _]) => vec![("near", near)],
+        None => vec![("panel", 0.0)],
+    }
 }
 
 /// How a field is looked at, beside the view.
@@ -157,6 +182,15 @@ pub fn picture(
 ) -> Result<Picture> {
     let (grid, values) = intensity(field, view, half, settings, progress)?;
     Ok(Picture::from_samples(&grid, &values, half, width, height))
+}
+
+/// Distance of planes [m] between which defocus blurs by at most one cell of a picture of `width × height` cells over
+/// ±`half` [m]: cell / tan θ, with θ the half angle of the light's cone, sin θ = λ·f_max.
+pub fn focus_step(field: &Field, settings: &ViewSettings, half: DVec2, (width, height): (usize, usize)) -> f64 {
+    let cell = (2.0 * half.x / width as f64).min(2.0 * half.y / height as f64);
+    let frequency = settings.aperture.map_or(field.grid.limit_x(), |a| a.half[0].max(a.half[1]));
+    let sine = (field.wavelength * frequency).clamp(1e-6, 0.9);
+    cell / (sine / (1.0 - sine * sine).sqrt())
 }
 
 /// A picture in which every pixel is in focus: each is taken from the reconstruction at its own depth.

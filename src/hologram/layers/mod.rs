@@ -13,6 +13,7 @@
 //! the grid can hold.
 
 mod leg;
+mod slices;
 #[cfg(test)]
 mod tests;
 mod window;
@@ -23,6 +24,7 @@ use crate::error::{Error, Result};
 use crate::field::{Complex32, Field, Grid};
 use crate::progress::Progress;
 use leg::{Buffers, Leg, Light};
+pub use slices::{SliceSettings, of_slices};
 use window::Window;
 
 /// Light on a plane parallel to the panel.
