@@ -9,7 +9,7 @@ use holodrive::pipeline::{self, SceneSettings};
 use holodrive::points::budget::Budget;
 use holodrive::points::colour::Lasers;
 use holodrive::progress::Progress;
-use holodrive::reconstruction::{ColorLight, ColorPicture, View};
+use holodrive::reconstruction::{ColorPicture, ExposureLight, Light, Reconstruction, View};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -91,20 +91,20 @@ fn lamps_come_back_in_their_colours_at_their_places() {
         pipeline::color_fields(cloud, &lasers, None, &grid, &HologramSettings::default(), &progress).expect("fields");
     assert_eq!(fields.gamut.outside_points, 0);
     let encode = EncodeSettings::new(Encoding::named("double-phase").expect("encoding"));
-    let mut behind = ColorLight { lasers, fields: [None, None, None] };
-    for (field, (computed, wavelength)) in
-        behind.fields.iter_mut().zip(fields.computed.into_iter().zip(lasers.wavelengths()))
-    {
+    let mut behind = Light { lasers: Some(lasers), exposures: Vec::new() };
+    for (laser, (computed, wavelength)) in fields.computed.into_iter().zip(lasers.wavelengths()).enumerate() {
         let computed = computed.expect("every laser has light");
         assert_eq!(computed.field.wavelength, wavelength);
         let frame = pipeline::frame(&computed.field, &profile, &encode, &progress).expect("frame").frame;
-        let (light, mut look) = pipeline::simulated_light(&frame, &Simulation::default(), &progress).expect("light");
-        look.block_zero_order(0.05f64.to_radians(), wavelength);
-        *field = Some((light, look));
+        let (field, mut settings) =
+            pipeline::simulated_light(&frame, &Simulation::default(), &progress).expect("light");
+        settings.block_zero_order(0.05f64.to_radians(), wavelength);
+        behind.exposures.push(ExposureLight { field, settings, laser });
     }
     let placing = &lit.view.placing;
     let target = ColorPicture { width: 200, height: 200, rgb: lit.view.picture.clone() };
-    let check = |name: &str, seen: &ColorPicture, error: f32| {
+    let check = |name: &str, seen: &Reconstruction, error: f32| {
+        let Reconstruction::Color(seen) = seen else { panic!("{name} in gray") };
         let found = means(seen, seen.white_like(&target, 1.0));
         for (lamp, wanted) in found.iter().zip(LAMPS) {
             // Its colour, and its brightness beside the others'.
@@ -128,7 +128,7 @@ fn lamps_come_back_in_their_colours_at_their_places() {
     // An eye takes the same part of each laser's light: no flat field, and the same colours.
     let focus = 0.5 * (lit.view.focus[0].1 + lit.view.focus[1].1);
     let eye = View::Eye { position: placing.eye.to_array(), pupil: 6e-3, focus };
-    let seen = behind.picture(&eye, placing.view_at(focus), (200, 200), &progress).expect("eye");
+    let seen = behind.picture(&eye, placing.view_at(focus), Some((200, 200)), &progress).expect("eye");
     check("eye", &seen, 0.25);
 }
 

@@ -7,8 +7,7 @@ use super::light::report_gamut;
 use super::load::{Panel, Points, hologram_settings};
 use super::report::Report;
 use super::show::{report_likeness, report_pictures};
-use glam::DVec2;
-use holodrive::field::npy::{self, CONVENTION, Content};
+use holodrive::field::npy::{self, Content};
 use holodrive::hologram::HologramSettings;
 use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Frame, Origin};
@@ -16,7 +15,7 @@ use holodrive::pipeline::{self, ColorFields, Lit};
 use holodrive::points::colour::{Lasers, NAMES};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::colour::laser_powers;
-use holodrive::reconstruction::{self, ColorLight, ColorPicture, View, write_rgb_png};
+use holodrive::reconstruction::{self, ColorPicture, ExposureLight, Light, Scale, View};
 use holodrive::units::show_length;
 use holodrive::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -180,26 +179,24 @@ pub(super) fn look(
     report: &mut Report,
 ) -> Result<()> {
     let (begin, out) = (Instant::now(), &args.output);
-    let mut behind = ColorLight { fields: [None, None, None], lasers: colors.lasers };
-    for (field, frame) in behind.fields.iter_mut().zip(&colors.frames) {
+    let mut behind = Light { exposures: Vec::new(), lasers: Some(colors.lasers) };
+    for (laser, frame) in colors.frames.iter().enumerate() {
         if let Some(frame) = frame {
-            let (light, mut settings) = pipeline::simulated_light(frame, &Simulation::default(), progress)?;
-            settings.block_zero_order(args.zero_order_stop, light.wavelength);
-            *field = Some((light, settings));
+            let (field, mut settings) = pipeline::simulated_light(frame, &Simulation::default(), progress)?;
+            settings.block_zero_order(args.zero_order_stop, field.wavelength);
+            behind.exposures.push(ExposureLight { field, settings, laser });
         }
     }
-    let Some((first, _)) = behind.fields.iter().flatten().next() else {
+    let Some(first) = behind.exposures.first() else {
         return Err(Error::input(&args.input, "has no light for any of the lasers"));
     };
     let Some(lit) = lit else {
         for (name, z) in reconstruction::planes_of(content.depth) {
             let view = View::Plane { z };
-            let half = view.seen_half(&first.grid, content.eye);
-            // One cell a pixel of the panel.
-            let cells = |half: f64, pitch: f64| (2.0 * half / pitch).ceil() as usize;
-            let size = (cells(half.x, first.grid.pitch_x), cells(half.y, first.grid.pitch_y));
-            let seen = behind.picture(&view, half, size, progress)?;
-            write(&out.join(format!("reconstruction-{name}.png")), &seen, seen.percentile(0.995), &view, half, colors)?;
+            let half = view.seen_half(&first.field.grid, content.eye);
+            let seen = behind.picture(&view, half, None, progress)?;
+            let white = seen.white(Scale::Percentile(0.995));
+            behind.write(&out.join(format!("reconstruction-{name}.png")), &seen, white, &view, half)?;
         }
         report_pictures(begin, report);
         return Ok(());
@@ -209,48 +206,26 @@ pub(super) fn look(
     let half_at = |z: f64| placing.view_at(z);
     let (white, near) = (lit.exposed.white, content.depth.map_or(0.0, |d| d[0]));
     let target = ColorPicture { width: size.0, height: size.1, rgb: lit.view.picture.clone() };
-    // The laser with the widest cone needs the closest planes.
-    let step = behind
-        .fields
-        .iter()
-        .flatten()
-        .map(|(field, settings)| reconstruction::focus_step(field, settings, half_at(near), size))
-        .fold(f64::INFINITY, f64::min);
+    let step = behind.focus_step(half_at(near), size);
     let (sharp, planes) = behind.all_in_focus(&lit.view.depths, size, half_at, step, progress)?;
     let likeness = sharp.likeness(&target, white);
     // One white for all pictures on planes: what is bright in one is as bright in the others.
     let shown = sharp.white_like(&target, white);
     let path = |name: &str| out.join(format!("reconstruction-{name}.png"));
-    write(&path("sharp"), &sharp, shown, &View::Plane { z: near }, half_at(near), colors)?;
+    behind.write(&path("sharp"), &sharp, shown, &View::Plane { z: near }, half_at(near))?;
     for (name, z) in &lit.view.focus {
         progress.start(&format!("focus {name}"), 0);
         let view = View::Plane { z: *z };
-        let seen = behind.picture(&view, half_at(*z), size, progress)?;
-        write(&path(name), &seen, shown, &view, half_at(*z), colors)?;
+        let seen = behind.picture(&view, half_at(*z), Some(size), progress)?;
+        behind.write(&path(name), &seen, shown, &view, half_at(*z))?;
         report.add(&format!("focus_{name}"), *z, format!("focus on {name}: {} behind the panel", show_length(-z)));
     }
     if let Some((_, focus)) = lit.view.focus.first() {
         let view = View::Eye { position: placing.eye.to_array(), pupil: 4e-3, focus: *focus };
-        let seen = behind.picture(&view, half_at(*focus), size, progress)?;
-        write(&path("eye"), &seen, seen.white_like(&target, white), &view, half_at(*focus), colors)?;
+        let seen = behind.picture(&view, half_at(*focus), Some(size), progress)?;
+        behind.write(&path("eye"), &seen, seen.white_like(&target, white), &view, half_at(*focus))?;
     }
     report_likeness(&likeness, "reconstruction in colour", planes, report);
     report_pictures(begin, report);
     Ok(())
-}
-
-fn write(path: &Path, picture: &ColorPicture, white: f32, view: &View, half: DVec2, colors: &Colors) -> Result<()> {
-    let described = serde_json::json!({
-        "simulated": true,
-        "focus": view.focus(),
-        "half": half.to_array(),
-        "white": white,
-        "wavelengths": colors.lasers.wavelengths(),
-        "convention": CONVENTION,
-    });
-    let texts = [
-        ("Description", "simulated reconstruction in the light of three lasers, sRGB".to_string()),
-        ("holodrive", described.to_string()),
-    ];
-    write_rgb_png(path, picture.width, picture.height, &picture.rgb, white, &texts)
 }

@@ -1,23 +1,10 @@
-//! Three reconstructions, each in the light of its own laser, as one picture in colour.
-//!
-//! The intensities of red, green and blue are drives of the lasers ([`Lasers`]), up to one factor that is the same for all
-//! three only if all collect a point's light alike. Through an *eye* they do: a point's wave has intensity a²/r² in the
-//! pupil, whatever its wavelength. A sensor on a *plane* takes the whole cone that the panel sends, which is wider in red:
-//! there each picture is divided by its solid angle first ([`super::flat_field`]).
-//!
-//! Fields are those that were encoded ([`crate::panel::EncodingRecord::scale`] divided out); on a real panel the lasers'
-//! powers do that ([`laser_powers`]).
+//! Three pictures, each in the light of its own laser, as one in colour.
 
-use super::metrics::{Likeness, blocks, psnr, ssim};
-use super::{Cone, Picture, View, ViewSettings, all_in_focus, picture};
-use crate::error::Result;
-use crate::field::Field;
+use super::metrics::{Likeness, blocks, least_squares, psnr, ssim};
+use super::{Picture, Scale};
 use crate::points::colour::Lasers;
 use crate::points::luminance;
-use crate::progress::Progress;
 use crate::scene::texture::srgb_from_linear;
-use glam::DVec2;
-use std::cell::Cell;
 
 /// A picture in linear Rec.709, row 0 on top; components are negative where a laser's light is outside Rec.709.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,68 +15,6 @@ pub struct ColorPicture {
     pub height: usize,
     /// Linear red, green and blue; any scale.
     pub rgb: Vec<[f32; 3]>,
-}
-
-/// Light of three lasers behind a panel.
-#[derive(Clone, Debug)]
-pub struct ColorLight {
-    /// The lasers.
-    pub lasers: Lasers,
-    /// Field of each, red, green, blue, and how it is looked at; none for a laser without light.
-    pub fields: [Option<(Field, ViewSettings)>; 3],
-}
-
-impl ColorLight {
-    /// A picture of one view on the rectangle ±`half` [m] of its focal plane; on a plane of radiance, its flat field
-    /// divided out ([`Cone::flatten`]).
-    ///
-    /// # Errors
-    /// As [`super::picture`].
-    pub fn picture(&self, view: &View, half: DVec2, size: (usize, usize), progress: &Progress) -> Result<ColorPicture> {
-        self.each(size, |field, settings| {
-            let mut seen = picture(field, view, half, size, settings, progress)?;
-            if let View::Plane { z } = *view {
-                Cone::new(field, settings).flatten(&mut seen, |_| half, |_| z);
-            }
-            Ok(seen)
-        })
-    }
-
-    /// A picture in which every pixel is in focus, of radiance, and the number of planes.
-    ///
-    /// # Errors
-    /// As [`super::all_in_focus`].
-    pub fn all_in_focus(
-        &self,
-        depths: &[Option<f64>],
-        size: (usize, usize),
-        half_at: impl Fn(f64) -> DVec2,
-        step: f64,
-        progress: &Progress,
-    ) -> Result<(ColorPicture, usize)> {
-        let farthest = depths.iter().flatten().fold(f64::INFINITY, |a, &z| a.min(z));
-        let planes = Cell::new(0);
-        let seen = self.each(size, |field, settings| {
-            let (mut seen, count) = all_in_focus(field, depths, size, &half_at, step, settings, progress)?;
-            planes.set(count);
-            Cone::new(field, settings).flatten(&mut seen, &half_at, |i| depths[i].unwrap_or(farthest));
-            Ok(seen)
-        })?;
-        Ok((seen, planes.get()))
-    }
-
-    /// Combines what is seen of each laser; one without light is dark.
-    fn each(
-        &self,
-        (width, height): (usize, usize),
-        see: impl Fn(&Field, &ViewSettings) -> Result<Picture>,
-    ) -> Result<ColorPicture> {
-        let see = |i: usize| match &self.fields[i] {
-            Some((field, settings)) => see(field, settings),
-            None => Ok(Picture { width, height, values: vec![0.0; width * height] }),
-        };
-        Ok(ColorPicture::combine(&self.lasers, &[see(0)?, see(1)?, see(2)?]))
-    }
 }
 
 /// Powers of the three lasers for a panel that shows frames of these scales one after another, the largest 1.
@@ -133,7 +58,7 @@ impl ColorPicture {
     /// The value that a part (0 to 1) of the pixels' largest components does not pass.
     pub fn percentile(&self, part: f64) -> f32 {
         let largest = self.rgb.iter().map(|c| c.iter().fold(0.0f32, |a, &b| a.max(b))).collect();
-        Picture { width: self.width, height: self.height, values: largest }.white(super::Scale::Percentile(part))
+        Picture { width: self.width, height: self.height, values: largest }.white(Scale::Percentile(part))
     }
 
     /// One component, 0 red to 2 blue.
@@ -149,11 +74,7 @@ impl ColorPicture {
     /// When the sizes differ.
     pub fn likeness(&self, target: &Self, white: f32) -> Likeness {
         assert!((self.width, self.height) == (target.width, target.height), "pictures of one size are compared");
-        let pairs = || self.rgb.iter().flatten().zip(target.rgb.iter().flatten());
-        let norm: f64 = pairs().map(|(a, _)| f64::from(*a).powi(2)).sum();
-        // Values beyond white are shown as white; they must not decide the gain.
-        let product: f64 = pairs().map(|(a, b)| f64::from(*a) * f64::from(b.min(white))).sum();
-        let gain = if norm > 0.0 { product / norm } else { 0.0 };
+        let gain = least_squares(self.rgb.iter().flatten(), target.rgb.iter().flatten(), white);
         let scaled = Self { rgb: self.rgb.iter().map(|c| c.map(|v| (f64::from(v) * gain) as f32)).collect(), ..*self };
         let coded = |values: &[f32]| -> Vec<f32> {
             values.iter().map(|v| srgb_from_linear((v / white).clamp(0.0, 1.0))).collect()

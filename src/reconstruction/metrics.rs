@@ -1,6 +1,6 @@
 //! How good a picture is: PSNR, SSIM, speckle contrast, uniformity; how good a field: its normalised error.
 
-use super::Picture;
+use super::{Picture, Scale};
 use crate::field::{Complex32, Complex64};
 
 /// Peak signal-to-noise ratio of values in [0, 1]: −10·log₁₀(mean squared difference) [dB]; infinite when equal.
@@ -69,23 +69,28 @@ pub struct Likeness {
     pub gain: f64,
 }
 
+/// The factor by which a reconstruction is most like its target, in least squares; white is `white`.
+pub(super) fn gain(seen: &Picture, target: &Picture, white: f32) -> f64 {
+    least_squares(seen.values.iter(), target.values.iter(), white)
+}
+
+/// The gain of values against targets. Those beyond white are shown as white; they must not decide it.
+pub(super) fn least_squares<'a>(
+    seen: impl Iterator<Item = &'a f32> + Clone,
+    target: impl Iterator<Item = &'a f32>,
+    white: f32,
+) -> f64 {
+    let norm: f64 = seen.clone().map(|v| f64::from(*v).powi(2)).sum();
+    let product: f64 = seen.zip(target).map(|(a, b)| f64::from(*a) * f64::from(b.min(white))).sum();
+    if norm > 0.0 { product / norm } else { 0.0 }
+}
+
 /// Compares a reconstruction with its target, both linear, after one least-squares gain; white is `white`.
 pub fn likeness(seen: &Picture, target: &Picture, white: f32) -> Likeness {
     assert!(seen.width == target.width && seen.height == target.height, "pictures of one size are compared");
-    // Values beyond white are shown as white; they must not decide the gain.
-    let clipped = |v: f32| f64::from(v.min(white));
-    let dot = |a: &Picture, b: &Picture, f: &dyn Fn(f32) -> f64, g: &dyn Fn(f32) -> f64| -> f64 {
-        a.values.iter().zip(&b.values).map(|(a, b)| f(*a) * g(*b)).sum()
-    };
-    let plain = |v: f32| f64::from(v);
-    let norm = dot(seen, seen, &plain, &plain);
-    let gain = if norm > 0.0 { dot(seen, target, &plain, &clipped) / norm } else { 0.0 };
-    let scaled = Picture {
-        width: seen.width,
-        height: seen.height,
-        values: seen.values.iter().map(|v| (f64::from(*v) * gain) as f32).collect(),
-    };
-    let scale = super::Scale::White(white);
+    let gain = gain(seen, target, white);
+    let scaled = Picture { values: seen.values.iter().map(|v| (f64::from(*v) * gain) as f32).collect(), ..*seen };
+    let scale = Scale::White(white);
     let (a, b) = (scaled.coded(scale), target.coded(scale));
     let (ba, bb) = (blocks(&scaled, 5).coded(scale), blocks(target, 5).coded(scale));
     Likeness { psnr: psnr(&a, &b), ssim: ssim(&a, &b, seen.width, seen.height), psnr_blocks: psnr(&ba, &bb), gain }

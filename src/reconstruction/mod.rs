@@ -7,12 +7,14 @@
 
 pub mod colour;
 pub mod flat_field;
+mod light;
 pub mod metrics;
 pub mod orders;
 mod picture;
 
-pub use colour::{ColorLight, ColorPicture};
+pub use colour::ColorPicture;
 pub use flat_field::Cone;
+pub use light::{ExposureLight, Light, Reconstruction};
 pub use orders::{Orders, orders};
 pub use picture::{Picture, Scale, read_gray, write_coded_png, write_rgb_png};
 
