@@ -81,7 +81,7 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
     let rate = args.sequence.fps.unwrap_or(USUAL_RATE);
     let animation = Animation::new(path, &settings, rate, args.sequence.from, args.sequence.to)?;
     #[cfg(feature = "display")]
-    let screen = args.monitor.as_deref().map(super::screen::Screen::find).transpose()?;
+    let screen = super::screen::Screen::asked(args)?;
     let content = match settings.placement {
         Placement::Window { near, far, .. } => Some([near, far]),
         Placement::Model { z, .. } => Some([z, z]),
@@ -195,11 +195,10 @@ fn play(
     progress: &std::sync::Arc<Progress>,
     report: &mut Report,
 ) -> Result<()> {
-    use super::screen::packed;
     use super::sequence::state_memory;
     use super::sequence_args::Ahead;
     use holodrive::Error;
-    use holodrive::display::DisplayFrame;
+    use holodrive::display::{DisplayFrame, PlaySettings};
     use std::sync::mpsc::sync_channel;
     use std::sync::{Arc, Mutex};
 
@@ -210,9 +209,12 @@ fn play(
     if all || args.sequence.repeat {
         state_memory(frames, (signal.width, signal.height))?;
     }
-    let settle = maker.panel.profile.settle_time.unwrap_or(0.0);
-    // The clip runs at its own speed, whatever the monitor's rate is.
-    let rate = Some(args.sequence.fps.unwrap_or(USUAL_RATE));
+    let mut playing = PlaySettings {
+        // The clip runs at its own speed, whatever the monitor's rate is.
+        rate: Some(args.sequence.fps.unwrap_or(USUAL_RATE)),
+        settle: maker.panel.profile.settle_time.unwrap_or(0.0),
+        ..screen.play_settings()
+    };
     let (took, warnings) = (Mutex::new(Vec::new()), Mutex::new(Vec::new()));
     let ready = |made: &Made| -> Result<Arc<DisplayFrame>> {
         made.encoded.frame.write(&frame_path(&args.output, made.number))?;
@@ -222,7 +224,7 @@ fn play(
         if let (0, Ok(mut warnings)) = (made.number, warnings.lock()) {
             warnings.clone_from(&made.lit.warnings);
         }
-        Ok(Arc::new(packed(&[&made.encoded.frame])?))
+        Ok(Arc::new(DisplayFrame::packed(&[&made.encoded.frame])?))
     };
     let outcome = if all {
         let mut kept: Vec<Arc<DisplayFrame>> = Vec::new();
@@ -232,13 +234,7 @@ fn play(
         })?;
         progress.start("", 0);
         let rounds = if args.sequence.repeat { usize::MAX } else { 1 };
-        screen.sequence(
-            (0..rounds).flat_map(|_| kept.iter().cloned().map(Ok)),
-            args,
-            (rate, settle, None),
-            progress,
-            report,
-        )
+        screen.sequence((0..rounds).flat_map(|_| kept.iter().cloned().map(Ok)), &playing, progress, report)
     } else {
         let making = Arc::new(Progress::new());
         let (sender, receiver) = sync_channel::<Result<Arc<DisplayFrame>>>(1);
@@ -264,7 +260,8 @@ fn play(
                 next += 1;
                 kept.get((next - 1) % kept.len().max(1)).cloned().map(Ok)
             });
-            screen.sequence(frames, args, (rate, settle, Some(Arc::clone(&making))), progress, report)
+            playing.making = Some(Arc::clone(&making));
+            screen.sequence(frames, &playing, progress, report)
         })
     };
     let took = took.into_inner().unwrap_or_default();

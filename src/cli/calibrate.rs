@@ -162,7 +162,7 @@ fn give_out(
         return Err(Error::unsupported("this build has no display; build it with the feature `display` (the default)"));
     }
     #[cfg(feature = "display")]
-    let screen = shown.monitor.as_deref().map(super::screen::Screen::find).transpose()?;
+    let screen = shown.monitor.as_deref().map(super::screen::Screen::named).transpose()?;
     // The first is made before the folder: what is wrong with the settings is found out without leaving one.
     make(0)?;
     let new = !folder.exists();

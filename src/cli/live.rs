@@ -6,11 +6,10 @@ use super::controls::{Changed, Choices, Controls, KEYS, TURN_STEP};
 use super::encoding::encode_settings;
 use super::load::{self, Panel, channel, hologram_settings, scene_settings};
 use super::report::{Report, count, seconds};
-use super::screen::{hold, packed, window};
+use super::screen::show_settings;
 use super::show::finish;
 use holodrive::display::{
-    Display, DisplayFrame, Key, KeyPress, Monitor, MonitorChoice, OperatorChoice, OperatorStanding, OperatorWindow,
-    PanelWindow, ShowEnd, Standing, WindowSettings,
+    Display, DisplayFrame, Key, KeyPress, OperatorChoice, PanelLoop, ShowEnd, ShowSettings, Turn,
 };
 use holodrive::live::{Board, Detail, Happened, PICTURE, Refined, Seen, Viewer, Watch, Wish, Worker, draw};
 use holodrive::panel::Frame;
@@ -24,7 +23,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Longest wait between two looks at what has happened.
-const TURN: Duration = Duration::from_millis(5);
+const LONGEST_TURN: Duration = Duration::from_millis(5);
 /// Time between two looks at the scene's files.
 const WATCH: Duration = Duration::from_millis(200);
 /// A show that follows its scene.
@@ -36,8 +35,7 @@ struct Live<'a> {
     worker: Worker,
     viewer: Viewer,
     watch: Watch,
-    window: PanelWindow,
-    operator: Option<OperatorWindow>,
+    shown: PanelLoop<'a>,
     newest: Option<Arc<Refined>>,
     seen: Option<Seen>,
     /// From the wish until the panel had it: of the newest hologram.
@@ -58,15 +56,14 @@ struct Counts {
 }
 
 pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<Report> {
-    let Some(name) = args.monitor.as_deref() else {
+    let Some(settings) = show_settings(args)? else {
         return Err(Error::parameter("live", "needs the panel's monitor: --monitor (see `holodrive monitors`)"));
     };
-    let choice: MonitorChoice = name.parse()?;
     let place: OperatorChoice = args.operator.parse()?;
     let panel = load::panel(&args.panel, &mut report)?;
     let mut display = Display::connect()?;
     let monitors = display.monitors()?;
-    let monitor = choice.find(&monitors)?.clone();
+    let monitor = settings.monitor.find(&monitors)?;
     let home = place.find(&monitors, &monitor)?;
     if home.is_none() && place == OperatorChoice::Auto {
         report.warn(["there is no monitor beside the panel's: no operator's view"]);
@@ -74,10 +71,16 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
     // The panel is taken with all levels at zero, before anything is computed.
     let levels = vec![0; panel.profile.width * panel.profile.height];
     let idle = Frame::new(&panel.profile, panel.wavelength, levels)?;
-    let settings = WindowSettings { take_keyboard: home.is_none(), ..window(args)? };
-    let window = PanelWindow::open(&mut display, &choice, &Arc::new(packed(&[&idle])?), &settings)?;
-    report.warn(window.warnings());
-    let operator = home.map(|home| open_operator(&mut display, &home, &monitor)).transpose()?;
+    let hold = settings.hold;
+    let window = WindowSettings { take_keyboard: home.is_none(), ..settings.window.clone() };
+    let settings = ShowSettings { window, ..settings };
+    let idle = Arc::new(DisplayFrame::packed(&[&idle])?);
+    let bar = Bar::new();
+    let mut shown = PanelLoop::open(&mut display, &idle, &settings, &bar.progress)?;
+    report.warn(shown.panel().warnings());
+    if let Some(home) = home {
+        shown.open_operator(&home, &Arc::new(picture(&Board { keys: &KEYS, ..Board::default() })?))?;
+    }
     let (choices, controls) = (Choices::new(args, &panel), Controls::new());
     let wish = wish(args, &panel, &choices, &controls)?;
     let scene = scene_settings(&args.light, &args.placement, White::Auto);
@@ -101,8 +104,7 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
         worker,
         viewer: Viewer::start(size),
         watch: Watch::new(files),
-        window,
-        operator,
+        shown,
         newest: None,
         seen: None,
         presented: 0.0,
@@ -111,20 +113,13 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
         begin: Instant::now(),
         counts: Counts::default(),
     };
-    let bar = Bar::new();
-    let end = live.run(&mut display, hold(args)?, &bar)?;
+    live.shown.hold_from(live.begin, hold);
+    let end = live.run()?;
     live.report(&mut report);
-    drop(live);
-    display.turn(Duration::ZERO)?;
-    match end {
-        ShowEnd::Absent { why } => Err(Error::Display { what: why }),
-        ShowEnd::Held | ShowEnd::Closed | ShowEnd::Stopped => finish(report, &args.output),
-    }
-}
-
-fn open_operator(display: &mut Display, home: &Monitor, panel: &Monitor) -> Result<OperatorWindow> {
-    let first = Arc::new(picture(&Board { keys: &KEYS, ..Board::default() })?);
-    OperatorWindow::open(display, home, panel, &first)
+    let Live { shown, worker, viewer, .. } = live;
+    drop((worker, viewer));
+    shown.close(end)?.end.as_asked()?;
+    finish(report, &args.output)
 }
 
 fn picture(board: &Board) -> Result<DisplayFrame> {
@@ -149,34 +144,17 @@ fn wish(args: &ShowArgs, panel: &Panel, choices: &Choices, controls: &Controls) 
 }
 
 impl Live<'_> {
-    fn run(&mut self, display: &mut Display, hold: Option<Duration>, bar: &Bar) -> Result<ShowEnd> {
+    fn run(&mut self) -> Result<ShowEnd> {
         let mut looked = Instant::now();
         loop {
-            if bar.progress.stopped() {
-                return Ok(ShowEnd::Stopped);
-            }
-            if hold.is_some_and(|hold| self.begin.elapsed() >= hold) {
-                return Ok(ShowEnd::Held);
-            }
-            display.turn(TURN)?;
-            match self.window.attend(display)? {
-                Standing::Ended => return Ok(ShowEnd::Closed),
-                Standing::Absent { why } if super::screen::ends_when_absent(self.args) => {
-                    return Ok(ShowEnd::Absent { why });
+            match self.shown.turn(LONGEST_TURN)? {
+                Turn::Ended(end) => return Ok(end),
+                Turn::OperatorClosed => {
+                    self.warn("the operator's view came onto the panel's monitor again and again; it was closed");
                 }
-                Standing::Shown | Standing::Absent { .. } => {}
+                Turn::Shown | Turn::Returned | Turn::Absent { .. } => {}
             }
-            let mut keys = self.window.keys();
-            if let Some(operator) = &mut self.operator {
-                match operator.attend()? {
-                    OperatorStanding::Shown => keys.extend(operator.keys()),
-                    OperatorStanding::Ended => return Ok(ShowEnd::Closed),
-                    OperatorStanding::Strayed => {
-                        self.operator = None;
-                        self.warn("the operator's view came onto the panel's monitor again and again; it was closed");
-                    }
-                }
-            }
+            let keys = self.shown.keys();
             self.keys(&keys)?;
             if looked.elapsed() >= WATCH {
                 looked = Instant::now();
@@ -264,7 +242,7 @@ impl Live<'_> {
 
     fn present(&mut self, refined: Arc<Refined>) -> Result<()> {
         let ready = Instant::now();
-        self.window.present(&Arc::new(packed(&[&refined.frame])?))?;
+        self.shown.panel_mut().present(&Arc::new(DisplayFrame::packed(&[&refined.frame])?))?;
         self.presented = refined.seconds + ready.elapsed().as_secs_f64();
         self.counts.shown[refined.detail as usize] += 1;
         match refined.detail {
@@ -312,8 +290,10 @@ impl Live<'_> {
     }
 
     fn redraw(&mut self) -> Result<()> {
+        if self.shown.operator().is_none() {
+            return Ok(());
+        }
         let lines = self.lines();
-        let Some(operator) = &mut self.operator else { return Ok(()) };
         let board = Board {
             seen: self.seen.as_ref().map(|seen| &seen.picture),
             frame: self.newest.as_ref().map(|newest| &newest.frame),
@@ -321,7 +301,8 @@ impl Live<'_> {
             keys: &KEYS,
             warning: self.warning.as_deref(),
         };
-        operator.present(&Arc::new(picture(&board)?))
+        let picture = Arc::new(picture(&board)?);
+        self.shown.operator().map_or(Ok(()), |operator| operator.present(&picture))
     }
 
     fn lines(&self) -> Vec<(String, String)> {
@@ -354,7 +335,7 @@ impl Live<'_> {
         }
         lines.push(("turned", format!("{:+}, {:+} degrees", degrees[0], degrees[1])));
         lines.push(("shifted", format!("{x:+.1}, {y:+.1}, {z:+.0} mm")));
-        lines.push(("panel", format!("{} on {}", self.panel.profile.name, self.window.monitor().name)));
+        lines.push(("panel", format!("{} on {}", self.panel.profile.name, self.shown.panel().monitor().name)));
         lines.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
     }
 
@@ -383,7 +364,7 @@ impl Live<'_> {
         let longest = self.counts.cancelled.iter().copied().fold(0.0, f64::max);
         report.add_serialised(
             "display",
-            &json!({ "monitor": self.window.monitor(), "frames": self.window.frames() }),
+            &json!({ "monitor": self.shown.panel().monitor(), "frames": self.shown.panel().frames() }),
             "",
         );
         report.add("shown", self.counts.shown.to_vec(), "");
@@ -393,7 +374,7 @@ impl Live<'_> {
         report.add("longest_cancel", longest, "");
         let line = format!(
             "live on {}: {} changes; a coarse hologram after {}, a full one after {} (medians); {} computations stopped, at most {} after",
-            self.window.monitor().name,
+            self.shown.panel().monitor().name,
             self.counts.to_coarse.len(),
             median(&self.counts.to_coarse).map_or("-".into(), seconds),
             median(&self.counts.to_full).map_or("-".into(), seconds),

@@ -9,7 +9,7 @@ use super::report::{Report, count, seconds};
 use super::sequence_args::Ahead;
 use super::show::finish;
 #[cfg(feature = "display")]
-use holodrive::display::DisplayFrame;
+use holodrive::display::{DisplayFrame, PlaySettings};
 use holodrive::field::npy_stack::LevelStack;
 use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Frame, PanelProfile};
@@ -144,22 +144,25 @@ fn prepared(args: &ShowArgs, source: &Source, mut report: Report) -> Result<Repo
     let frames = opener.open()?;
     let notes = frames.notes();
     #[cfg(feature = "display")]
-    if let Some(name) = &args.monitor {
-        let screen = super::screen::Screen::find(name)?;
+    if let Some(screen) = super::screen::Screen::asked(args)? {
         files::output_folder(&args.output)?;
         let again = args.sequence.repeat.then(|| opener.clone());
         let played = Repeated { frames, again, shown: false };
-        let settle = panel.profile.settle_time.unwrap_or(0.0);
-        let making = Some(Arc::clone(&opener.stop));
+        let playing = PlaySettings {
+            rate: args.sequence.fps,
+            settle: panel.profile.settle_time.unwrap_or(0.0),
+            making: Some(Arc::clone(&opener.stop)),
+            ..screen.play_settings()
+        };
         let outcome = if args.sequence.ahead == Ahead::All {
             // What was opened to be played as it comes is read here.
             all_ahead(played.frames, &opener, &bar.progress).and_then(|all| {
                 let rounds = if args.sequence.repeat { usize::MAX } else { 1 };
                 let frames = (0..rounds).flat_map(|_| all.iter().cloned().map(Ok));
-                screen.sequence(frames, args, (args.sequence.fps, settle, making), &bar.progress, &mut report)
+                screen.sequence(frames, &playing, &bar.progress, &mut report)
             })
         } else {
-            screen.sequence(played, args, (args.sequence.fps, settle, making), &bar.progress, &mut report)
+            screen.sequence(played, &playing, &bar.progress, &mut report)
         };
         drop(bar);
         report.warn(notes.lock().map(|notes| notes.clone()).unwrap_or_default());
@@ -308,6 +311,5 @@ fn all_ahead(frames: Prepared, opener: &Opener, progress: &Progress) -> Result<V
 
 #[cfg(feature = "display")]
 fn for_display(shown: Shown) -> Result<DisplayFrame> {
-    let signal = shown.signal()?;
-    DisplayFrame::from_rgb(signal.width as u32, signal.height as u32, signal.rgb.as_chunks().0.to_vec())
+    DisplayFrame::from_video(shown.signal()?)
 }

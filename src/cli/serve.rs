@@ -148,34 +148,33 @@ impl Job<'_> {
 
     #[cfg(feature = "display")]
     fn on_monitor(&self, monitor: &str, report: &mut Report) -> Result<KeepReport> {
-        use super::args::PresenterArg;
-        use holodrive::display::{Display, MonitorChoice, Presenter, ServedWindow, WindowSettings};
+        use super::screen::window_settings;
+        use holodrive::display::{Display, DisplayFrame, OnAbsence, PanelLoop, ShowEnd, ShowSettings};
         if self.args.output.is_some() {
             let what = "frames are written on the simulated panel only; give --monitor none, or leave it out";
             return Err(Error::parameter("--output", what));
         }
-        let choice: MonitorChoice = monitor.parse()?;
-        let window = WindowSettings {
-            presenter: match self.args.present {
-                PresenterArg::Auto => Presenter::Auto,
-                PresenterArg::Gpu => Presenter::Gpu,
-                PresenterArg::Software => Presenter::Software,
-            },
-            exact: !self.args.allow_altered_levels,
-            trigger: self.args.trigger_patch.as_deref().map(str::parse).transpose()?,
-            ..WindowSettings::default()
+        let settings = ShowSettings {
+            window: window_settings(
+                self.args.present,
+                self.args.allow_altered_levels,
+                self.args.trigger_patch.as_deref(),
+            )?,
+            on_absence: OnAbsence::Wait,
+            ..ShowSettings::new(monitor.parse()?)
         };
         let mut display = Display::connect()?;
-        choice.find(&display.monitors()?)?;
+        settings.monitor.find(&display.monitors()?)?;
         // A port that is taken is found out before the panel shows anything.
         let server = Server::start(self.served.clone(), &self.settings)?;
-        let mut output = ServedWindow::open(&mut display, (&choice, &window), self.idle)?;
-        report.warn(output.warnings().iter());
-        let place = output.monitor().name.clone();
+        let idle = std::sync::Arc::new(DisplayFrame::packed(&[self.idle])?);
+        let mut output = PanelLoop::open(&mut display, &idle, &settings, self.progress)?;
+        report.warn(output.panel().warnings().iter());
+        let place = output.panel().monitor().name.clone();
         let kept = self.keep(&server, &mut output, &place)?;
-        report.add_serialised("monitor", output.monitor(), "");
-        report.add("covered", output.covered(), "");
-        output.close()?;
+        let window = output.close(ShowEnd::Stopped)?;
+        report.add_serialised("monitor", &window.monitor, "");
+        report.add("covered", window.covered, "");
         Ok(kept)
     }
 

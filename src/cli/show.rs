@@ -64,7 +64,7 @@ fn run(args: &ShowArgs) -> Result<Report> {
     }
     // A monitor that is not there is found out before the work, not after it.
     #[cfg(feature = "display")]
-    let screen = args.monitor.as_deref().map(super::screen::Screen::find).transpose()?;
+    let screen = super::screen::Screen::asked(args)?;
     files::output_folder(out)?;
     let bar = Bar::new();
     let (frame, lit, content) = match &source {
@@ -111,7 +111,7 @@ fn run(args: &ShowArgs) -> Result<Report> {
     #[cfg(feature = "display")]
     if let Some(screen) = screen {
         bar.progress.start("", 0);
-        screen.show(&[&frame], args, &bar.progress, &mut report)?;
+        screen.show(&[&frame], &bar.progress, &mut report)?;
         return finish(report, out);
     }
     look(&frame, lit.as_ref(), &content, args, &bar.progress, &mut report)?;
@@ -150,7 +150,7 @@ fn live(_: &ShowArgs, _: Report) -> Result<Report> {
 fn in_sub_frames(args: &ShowArgs, source: &Input, panel: &Panel, begin: Instant, mut report: Report) -> Result<Report> {
     super::subframes::check(args, panel)?;
     #[cfg(feature = "display")]
-    let screen = args.monitor.as_deref().map(super::screen::Screen::find).transpose()?;
+    let screen = super::screen::Screen::asked(args)?;
     if matches!(source, Input::Frame(_) | Input::Field(_)) {
         let what = "sub-frames are for scenes, point clouds and pictures with depth; a field has its phases";
         return Err(Error::parameter("subframes", what));
@@ -165,7 +165,7 @@ fn in_sub_frames(args: &ShowArgs, source: &Input, panel: &Panel, begin: Instant,
     #[cfg(feature = "display")]
     if let Some(screen) = screen {
         bar.progress.start("", 0);
-        screen.show(&frames.iter().collect::<Vec<_>>(), args, &bar.progress, &mut report)?;
+        screen.show(&frames.iter().collect::<Vec<_>>(), &bar.progress, &mut report)?;
         return finish(report, &args.output);
     }
     let content = content(&points.cloud, &points.metadata);
@@ -185,7 +185,7 @@ fn in_color(
     mut report: Report,
 ) -> Result<Report> {
     #[cfg(feature = "display")]
-    let screen = args.monitor.as_deref().map(super::screen::Screen::find).transpose()?;
+    let screen = super::screen::Screen::asked(args)?;
     files::output_folder(&args.output)?;
     let bar = Bar::new();
     let points = load_points(source, (&args.light, &args.placement, White::Auto), panel, &bar.progress, &mut report)?;
@@ -197,7 +197,7 @@ fn in_color(
     if let Some(screen) = screen {
         bar.progress.start("", 0);
         let frames = colors.for_signal()?;
-        screen.show(&frames.iter().collect::<Vec<_>>(), args, &bar.progress, &mut report)?;
+        screen.show(&frames.iter().collect::<Vec<_>>(), &bar.progress, &mut report)?;
         return finish(report, &args.output);
     }
     let content = content(&points.cloud, &points.metadata);

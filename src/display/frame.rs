@@ -1,6 +1,7 @@
 //! The frame as it leaves for the monitor: packed 8-bit RGB video pixels.
 
 use crate::error::{Error, Result};
+use crate::panel::{Frame, VideoFrame};
 
 /// One video frame: 8-bit RGB, row-major, row 0 on top, exactly the monitor's size.
 ///
@@ -32,6 +33,28 @@ impl DisplayFrame {
     pub fn from_gray(width: u32, height: u32, levels: &[u8]) -> Result<Self> {
         Self::check(width, height, levels.len())?;
         Ok(Self { width, height, pixels: levels.iter().map(|&level| [level; 3]).collect() })
+    }
+
+    /// The video signal of a panel.
+    ///
+    /// # Errors
+    ///
+    /// As [`DisplayFrame::from_rgb`].
+    pub fn from_video(video: VideoFrame) -> Result<Self> {
+        // The same memory, read as pixels.
+        let pixels =
+            bytemuck::allocation::try_cast_vec(video.rgb).unwrap_or_else(|(_, rgb)| rgb.as_chunks().0.to_vec());
+        Self::from_rgb(video.width as u32, video.height as u32, pixels)
+    }
+
+    /// Frames of drive levels, one or as many as the panel's signal carries at once, packed as its profile says.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`crate::panel::VideoSignal::pack`].
+    pub fn packed(frames: &[&Frame]) -> Result<Self> {
+        let Some(first) = frames.first() else { return Err(Error::parameter("frame", "there is none to show")) };
+        Self::from_video(first.metadata.panel.signal.pack(frames)?)
     }
 
     /// Width [px].

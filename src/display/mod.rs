@@ -2,9 +2,8 @@
 //!
 //! [`Display`] is the connection to the window system. [`Display::monitors`] lists what there is; [`MonitorChoice`]
 //! names one by connector, EDID, serial number or place. [`PanelWindow`] covers one monitor exactly and keeps it so;
-//! [`show`] does the whole for one frame, [`play`] for a sequence of them; [`ServedWindow`] is for what other programs
-//! send.
-//! [`OperatorWindow`] is an ordinary window beside it, never on the panel's monitor.
+//! [`OperatorWindow`] is an ordinary window beside it, never on the panel's monitor. [`PanelLoop`] is the event loop of both:
+//! [`show`] runs it for one frame, [`play`] for a sequence of them, and [`crate::serve::keep`] for what other programs send.
 //! [`examine`] looks at everything that is known to spoil levels, and [`test_card`] shows it to an eye.
 //!
 //! # What is promised
@@ -22,10 +21,12 @@
 mod doctor;
 mod edid;
 mod frame;
+mod frame_times;
 mod kernel;
 mod keys;
 mod monitor;
 mod operator;
+mod panel_loop;
 mod play;
 mod presenter;
 mod region;
@@ -43,14 +44,15 @@ mod x11;
 pub use doctor::{Finding, Severity, examine};
 pub use edid::{Edid, NativeMode};
 pub use frame::DisplayFrame;
+pub use frame_times::{FrameStatistics, FrameTime};
 pub use keys::{Key, KeyPress};
 pub use monitor::{Gamma, Monitor, MonitorChoice, ScanOut};
 pub use operator::{OperatorChoice, OperatorStanding, OperatorWindow};
-pub use play::{FrameTime, PlayReport, PlaySettings, play};
+pub use panel_loop::{OnAbsence, PanelLoop, ShowEnd, ShowSettings, Turn, WindowReport};
+pub use play::{PlayReport, PlaySettings, play};
 pub use presenter::Presenter;
-pub use serving::ServedWindow;
 pub use session::Display;
-pub use show::{OnAbsence, ShowEnd, ShowReport, ShowSettings, show};
+pub use show::{ShowReport, show};
 pub use test_card::test_card;
 pub use trigger::TriggerPatch;
 pub use window::{PanelWindow, Presented, Standing, WindowSettings};

@@ -19,6 +19,10 @@ use winit::event_loop::ActiveEventLoop;
 use winit::raw_window_handle::{HasWindowHandle, RawWindowHandle};
 use winit::window::{Fullscreen, Window, WindowAttributes, WindowLevel};
 
+/// Assumed of a monitor that does not tell its refresh rate [Hz].
+const USUAL_REFRESH: f64 = 60.0;
+/// Refresh rates that a monitor may have [Hz].
+const REFRESH_RATES: std::ops::RangeInclusive<f64> = 1.0..=1e4;
 /// How long the window system may take to put the window where it belongs.
 const SETTLE_LIMIT: Duration = Duration::from_secs(5);
 /// How long it must have stood there before it counts as settled: window managers move a window just after it appears.
@@ -131,6 +135,11 @@ impl PanelWindow {
     /// The monitor that it is on.
     pub fn monitor(&self) -> &Monitor {
         &self.monitor
+    }
+
+    /// Time of one refresh of its monitor [s].
+    pub(super) fn refresh_time(&self) -> f64 {
+        1.0 / self.monitor.refresh.filter(|rate| REFRESH_RATES.contains(rate)).unwrap_or(USUAL_REFRESH)
     }
 
     /// Who puts frames into it: [`Presenter::Gpu`] or [`Presenter::Software`]; none while its monitor is absent.

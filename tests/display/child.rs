@@ -58,6 +58,15 @@ impl ShowJob {
         Picture::new(self.pattern, self.width, self.height)
     }
 
+    fn settings(&self) -> holodrive::Result<ShowSettings> {
+        Ok(ShowSettings {
+            window: self.window()?,
+            hold: self.hold.map(Duration::from_secs_f64),
+            on_absence: if self.wait { OnAbsence::Wait } else { OnAbsence::End },
+            ..ShowSettings::new(self.monitor.parse()?)
+        })
+    }
+
     fn window(&self) -> holodrive::Result<WindowSettings> {
         Ok(WindowSettings { presenter: self.presenter.parse()?, exact: self.exact, ..WindowSettings::default() })
     }
@@ -82,26 +91,9 @@ fn run(job: Job) -> holodrive::Result<serde_json::Value> {
     match job {
         Job::Monitors => Ok(json(&display.monitors()?)),
         Job::Examine(monitor) => Ok(json(&examine(&mut display, Some(&monitor.parse()?))?)),
-        Job::Show(job) => {
-            let settings = ShowSettings {
-                monitor: job.monitor.parse()?,
-                window: job.window()?,
-                hold: job.hold.map(Duration::from_secs_f64),
-                on_absence: if job.wait { OnAbsence::Wait } else { OnAbsence::End },
-            };
-            Ok(json(&show(&mut display, job.picture().frame(), &settings, &stopped_by_input())?))
-        }
+        Job::Show(job) => Ok(json(&show(&mut display, job.picture().frame(), &job.settings()?, &stopped_by_input())?)),
         Job::Play(job, count, rate) => {
-            let settings = PlaySettings {
-                monitor: job.monitor.parse()?,
-                window: job.window()?,
-                rate,
-                hold: job.hold.map(Duration::from_secs_f64),
-                ahead: 4,
-                on_absence: OnAbsence::End,
-                settle: 0.02,
-                making: None,
-            };
+            let settings = PlaySettings { show: job.settings()?, rate, ahead: 4, settle: 0.02, making: None };
             let frames = (0..count).map(|number| Ok(Picture::numbered(number, job.width, job.height).frame()));
             let mut times = Vec::new();
             let report = play(&mut display, frames, &settings, &mut |t| times.push(*t), &stopped_by_input())?;
