@@ -8,9 +8,7 @@ use super::load::{self, Panel, channel, hologram_settings, scene_settings};
 use super::report::{Report, count, seconds};
 use super::screen::show_settings;
 use super::show::finish;
-use holodrive::display::{
-    Display, DisplayFrame, Key, KeyPress, OperatorChoice, PanelLoop, ShowEnd, ShowSettings, Turn,
-};
+use holodrive::display::{Display, DisplayFrame, Key, KeyPress, OperatorChoice, PanelLoop, ShowEnd, Turn};
 use holodrive::live::{Board, Detail, Happened, PICTURE, Refined, Seen, Viewer, Watch, Wish, Worker, draw};
 use holodrive::panel::Frame;
 use holodrive::points::Placement;
@@ -56,7 +54,7 @@ struct Counts {
 }
 
 pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<Report> {
-    let Some(settings) = show_settings(args)? else {
+    let Some(mut settings) = show_settings(args)? else {
         return Err(Error::parameter("live", "needs the panel's monitor: --monitor (see `holodrive monitors`)"));
     };
     let place: OperatorChoice = args.operator.parse()?;
@@ -71,9 +69,7 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
     // The panel is taken with all levels at zero, before anything is computed.
     let levels = vec![0; panel.profile.width * panel.profile.height];
     let idle = Frame::new(&panel.profile, panel.wavelength, levels)?;
-    let hold = settings.hold;
-    let window = WindowSettings { take_keyboard: home.is_none(), ..settings.window.clone() };
-    let settings = ShowSettings { window, ..settings };
+    settings.window.take_keyboard = home.is_none();
     let idle = Arc::new(DisplayFrame::packed(&[&idle])?);
     let bar = Bar::new();
     let mut shown = PanelLoop::open(&mut display, &idle, &settings, &bar.progress)?;
@@ -113,7 +109,7 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
         begin: Instant::now(),
         counts: Counts::default(),
     };
-    live.shown.hold_from(live.begin, hold);
+    live.shown.hold_from(live.begin, settings.hold);
     let end = live.run()?;
     live.report(&mut report);
     let Live { shown, worker, viewer, .. } = live;

@@ -1,7 +1,9 @@
 //! What would spoil levels between a frame and the panel: everything that can be found out, with its remedy.
 
-use super::monitor::{Gamma, Monitor, MonitorChoice};
+use super::choice::MonitorChoice;
+use super::monitor::{Gamma, Monitor};
 use super::session::Display;
+use super::x11::{Property, Screen};
 use crate::error::Result;
 use serde::Serialize;
 
@@ -31,22 +33,6 @@ pub struct Finding {
     pub severity: Severity,
     /// What was found, and what to do about it where something can be done.
     pub what: String,
-}
-
-/// What the X server tells of the desktop as a whole.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Screen {
-    /// Bits per pixel that carry colour.
-    pub(super) depth: u8,
-    /// Whether a compositing manager is at work.
-    pub(super) composited: bool,
-}
-
-/// A property of an output as its driver names it, with its value in words.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Property {
-    pub(super) name: String,
-    pub(super) value: String,
 }
 
 /// Looks at everything that is known to spoil levels: on one monitor, or on all.

@@ -18,6 +18,7 @@
 //! On X11 all of this is checked. On Wayland size, scale and rotation are; gamma tables and what else alters colours cannot
 //! be asked for. On other systems, what winit tells is checked.
 
+mod choice;
 mod doctor;
 mod edid;
 mod frame;
@@ -29,6 +30,7 @@ mod operator;
 mod panel_loop;
 mod play;
 mod presenter;
+mod rectangle;
 mod region;
 mod serving;
 mod session;
@@ -41,12 +43,13 @@ mod wayland;
 mod window;
 mod x11;
 
+pub use choice::MonitorChoice;
 pub use doctor::{Finding, Severity, examine};
 pub use edid::{Edid, NativeMode};
 pub use frame::DisplayFrame;
 pub use frame_times::{FrameStatistics, FrameTime};
 pub use keys::{Key, KeyPress};
-pub use monitor::{Gamma, Monitor, MonitorChoice, ScanOut};
+pub use monitor::{Gamma, Monitor, ScanOut};
 pub use operator::{OperatorChoice, OperatorStanding, OperatorWindow};
 pub use panel_loop::{OnAbsence, PanelLoop, ShowEnd, ShowSettings, Turn, WindowReport};
 pub use play::{PlayReport, PlaySettings, play};

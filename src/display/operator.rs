@@ -1,12 +1,13 @@
 //! The operator's window: an ordinary one, on any monitor but the panel's.
 
+use super::choice::MonitorChoice;
 use super::frame::DisplayFrame;
 use super::keys::KeyPress;
-use super::monitor::{Monitor, MonitorChoice};
+use super::monitor::Monitor;
 use super::presenter::{Presenter, Surface};
 use super::session::{Display, Inbox};
 use super::window::x11_id;
-use super::x11::{Rectangle, X11};
+use super::x11::X11;
 use crate::error::{Error, Result};
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -55,7 +56,7 @@ impl OperatorChoice {
     /// # Errors
     /// [`Error::Display`] when it was named and is the panel's, or shows a part of the same desktop, or is not there.
     pub fn find(&self, monitors: &[Monitor], panel: &Monitor) -> Result<Option<Monitor>> {
-        let apart = |monitor: &Monitor| !Rectangle::of(monitor).meets(&Rectangle::of(panel));
+        let apart = |monitor: &Monitor| !monitor.rectangle().meets(&panel.rectangle());
         match self {
             Self::None => Ok(None),
             Self::Auto => {
@@ -197,7 +198,7 @@ impl OperatorWindow {
     }
 
     fn on_panel(&self) -> Result<bool> {
-        let panel = Rectangle::of(&self.panel);
+        let panel = self.panel.rectangle();
         Ok(match &self.x11 {
             Some((x11, id)) => x11.placement(*id)?.is_some_and(|place| place.meets(&panel)),
             // Where the window system does not tell the place, it tells the monitor.

@@ -1,8 +1,9 @@
 //! The event loop of a panel's window: what happens to it, to its monitor and to the operator's window, and what ends it.
 
+use super::choice::MonitorChoice;
 use super::frame::DisplayFrame;
 use super::keys::KeyPress;
-use super::monitor::{Monitor, MonitorChoice};
+use super::monitor::Monitor;
 use super::operator::{OperatorStanding, OperatorWindow};
 use super::presenter::Presenter;
 use super::session::Display;

@@ -1,7 +1,7 @@
 //! A panel that is more, or less, than one monitor: several heads side by side, or a part of a large desktop.
 
 use super::monitor::Monitor;
-use super::x11::Rectangle;
+use super::rectangle::Rectangle;
 use crate::error::{Error, Result};
 
 /// The region as if it were one monitor, with those that show it as its parts.
@@ -11,8 +11,7 @@ use crate::error::{Error, Result};
 /// # Errors
 /// [`Error::Display`] when a part of it is on no monitor: frames would lose pixels.
 pub(super) fn joined(region: Rectangle, monitors: &[Monitor]) -> Result<Monitor> {
-    let parts: Vec<Monitor> =
-        monitors.iter().filter(|monitor| Rectangle::of(monitor).meets(&region)).cloned().collect();
+    let parts: Vec<Monitor> = monitors.iter().filter(|monitor| monitor.rectangle().meets(&region)).cloned().collect();
     let Rectangle { x, y, width, height } = region;
     if let Some((column, row)) = uncovered(region, &parts) {
         let list: Vec<String> = monitors.iter().map(ToString::to_string).collect();
@@ -35,6 +34,19 @@ pub(super) fn joined(region: Rectangle, monitors: &[Monitor]) -> Result<Monitor>
         scan_out: None,
         parts,
     })
+}
+
+impl Monitor {
+    /// The monitor that `self` was, among those that are there now: same connector, same EDID, though perhaps at another
+    /// place. A region is again there when all monitors that showed it show it.
+    pub(super) fn again(&self, monitors: &[Self]) -> Option<Self> {
+        if self.parts.is_empty() {
+            return monitors.iter().find(|now| now.name == self.name && now.edid == self.edid).cloned();
+        }
+        let now = joined(self.rectangle(), monitors).ok()?;
+        (now.parts.len() == self.parts.len() && self.parts.iter().all(|part| part.again(&now.parts).is_some()))
+            .then_some(now)
+    }
 }
 
 /// The smallest rectangle about some monitors.

@@ -1,13 +1,14 @@
 //! A window that covers one monitor exactly, one window pixel on each monitor pixel, and never any other.
 
+use super::choice::MonitorChoice;
 use super::frame::DisplayFrame;
 use super::keys::KeyPress;
-use super::monitor::{Monitor, MonitorChoice};
+use super::monitor::Monitor;
 use super::presenter::{Presenter, Surface};
 use super::session::{Display, Inbox};
 use super::trigger::TriggerPatch;
 use super::vblank::VerticalBlank;
-use super::x11::{Rectangle, X11};
+use super::x11::X11;
 use crate::error::{Error, Result};
 use serde::Serialize;
 use std::cell::RefCell;
@@ -422,7 +423,7 @@ fn settle(display: &mut Display, monitor: &Monitor, window: &Window, x11: Option
 fn deviation(monitor: &Monitor, window: &Window, x11: Option<&(Rc<X11>, u32)>) -> Result<Option<String>> {
     let name = &monitor.name;
     if let Some((x11, id)) = x11 {
-        let wanted = Rectangle::of(monitor);
+        let wanted = monitor.rectangle();
         return Ok(match x11.placement(*id)? {
             Some(place) if place == wanted => None,
             Some(place) => Some(format!("the window should cover {name} ({wanted}) but stands {place}")),

@@ -4,11 +4,11 @@
 //! events, but Xlib drops those of extensions that nobody registered with it), and know neither EDID nor gamma, so
 //! this second connection does.
 
-use super::doctor::{Property, Screen};
 use super::edid::Edid;
 use super::frame::DisplayFrame;
 use super::kernel;
 use super::monitor::{Gamma, Monitor, ScanOut};
+use super::rectangle::Rectangle;
 use crate::error::{Error, Result};
 use std::fmt;
 use x11rb::connection::{Connection, RequestConnection};
@@ -36,15 +36,6 @@ pub(super) struct X11 {
     edid_property: u32,
 }
 
-/// A rectangle of the desktop [px].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Rectangle {
-    pub(super) x: i32,
-    pub(super) y: i32,
-    pub(super) width: u32,
-    pub(super) height: u32,
-}
-
 /// What has happened on the desktop since the last look.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Changes {
@@ -54,34 +45,28 @@ pub(super) struct Changes {
     pub(super) windows: bool,
 }
 
-struct Lit {
+/// An output that shows a part of the desktop.
+struct ActiveOutput {
     name: String,
     output: Output,
     info: GetOutputInfoReply,
     crtc: GetCrtcInfoReply,
 }
 
-impl fmt::Display for Rectangle {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}x{} at {},{}", self.width, self.height, self.x, self.y)
-    }
+/// What the X server tells of the desktop as a whole.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Screen {
+    /// Bits per pixel that carry colour.
+    pub(super) depth: u8,
+    /// Whether a compositing manager is at work.
+    pub(super) composited: bool,
 }
 
-impl Rectangle {
-    pub(super) fn of(monitor: &Monitor) -> Self {
-        Self { x: monitor.x, y: monitor.y, width: monitor.width, height: monitor.height }
-    }
-
-    fn of_crtc(crtc: &GetCrtcInfoReply) -> Self {
-        Self { x: crtc.x.into(), y: crtc.y.into(), width: crtc.width.into(), height: crtc.height.into() }
-    }
-
-    pub(super) fn meets(&self, other: &Self) -> bool {
-        let apart = |a: i32, a_size: u32, b: i32, b_size: u32| {
-            i64::from(a) + i64::from(a_size) <= i64::from(b) || i64::from(b) + i64::from(b_size) <= i64::from(a)
-        };
-        !apart(self.x, self.width, other.x, other.width) && !apart(self.y, self.height, other.y, other.height)
-    }
+/// A property of an output as its driver names it, with its value in words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Property {
+    pub(super) name: String,
+    pub(super) value: String,
 }
 
 impl X11 {
@@ -109,7 +94,7 @@ impl X11 {
         let resources =
             c.randr_get_screen_resources_current(self.root).map_err(unanswered)?.reply().map_err(unanswered)?;
         let primary = c.randr_get_output_primary(self.root).map_err(unanswered)?.reply().map_err(unanswered)?.output;
-        let mut lit = Vec::new();
+        let mut active = Vec::new();
         for &output in &resources.outputs {
             // What vanishes between two questions is not there.
             let Some(info) = there(c.randr_get_output_info(output, 0).map_err(unanswered)?.reply())? else { continue };
@@ -119,15 +104,15 @@ impl X11 {
             let Some(crtc) = there(c.randr_get_crtc_info(info.crtc, 0).map_err(unanswered)?.reply())? else { continue };
             if crtc.mode != 0 && crtc.width > 0 && crtc.height > 0 {
                 let name = String::from_utf8_lossy(&info.name).into_owned();
-                lit.push(Lit { name, output, info, crtc });
+                active.push(ActiveOutput { name, output, info, crtc });
             }
         }
         let mode = |id: u32| resources.modes.iter().find(|mode| mode.id == id);
-        let mut monitors = Vec::with_capacity(lit.len());
-        for (index, one) in lit.iter().enumerate() {
+        let mut monitors = Vec::with_capacity(active.len());
+        for (index, one) in active.iter().enumerate() {
             let preferred = (one.info.num_preferred > 0).then(|| one.info.modes.first()).flatten();
-            let place = Rectangle::of_crtc(&one.crtc);
-            let shares = |other: &&Lit| other.output != one.output && place.meets(&Rectangle::of_crtc(&other.crtc));
+            let place = rectangle_of(&one.crtc);
+            let shares = |other: &&ActiveOutput| other.output != one.output && place.meets(&rectangle_of(&other.crtc));
             monitors.push(Monitor {
                 index,
                 name: one.name.clone(),
@@ -143,7 +128,7 @@ impl X11 {
                     rotated: one.crtc.rotation != randr::Rotation::ROTATE0,
                     transformed: self.transformed(one.info.crtc)?,
                     gamma: self.gamma(one.info.crtc)?,
-                    shared_with: lit.iter().filter(shares).map(|other| other.name.clone()).collect(),
+                    shared_with: active.iter().filter(shares).map(|other| other.name.clone()).collect(),
                     preferred: preferred
                         .and_then(|id| mode(*id))
                         .map(|mode| (u32::from(mode.width), u32::from(mode.height))),
@@ -353,6 +338,11 @@ impl X11 {
         }
         Ok(changes)
     }
+}
+
+/// The part of the desktop that a CRTC scans out.
+fn rectangle_of(crtc: &GetCrtcInfoReply) -> Rectangle {
+    Rectangle { x: crtc.x.into(), y: crtc.y.into(), width: crtc.width.into(), height: crtc.height.into() }
 }
 
 /// Frames per second of a mode [Hz]: the pixel clock over all pixels, blanking included.
