@@ -9,15 +9,13 @@ use crate::hologram::{self, Computed, HologramSettings};
 use crate::illumination::{Illumination, IlluminationReport, IlluminationSettings};
 use crate::panel::simulated::{self, Simulation};
 use crate::panel::{Frame, PanelProfile};
-use crate::points::budget::{Budget, Limit, Rays, Resolution};
+use crate::points::budget::{Budget, Rays};
 use crate::points::colour::{Gamut, Lasers};
-use crate::points::exposure::{Exposed, Exposure};
-use crate::points::placement::{self, Held, Phase, Placing, WorldPoint};
-use crate::points::trace::{self, TraceReport, TraceSettings, Traced};
-use crate::points::{self, Channel, Placed, Placement, PointCloud, PointSource};
+use crate::points::placement::{self, Phase, SequenceAnchors, WorldPoint};
+use crate::points::trace::{self, TraceReport, TraceSettings};
+use crate::points::{self, Channel, Placed, Placement, PointCloud, PointSource, SceneView, WhiteLevel, WhitePoint};
 use crate::progress::Progress;
 use crate::propagation::Aperture;
-use crate::random::Random;
 use crate::reconstruction::ViewSettings;
 use crate::scene::{Camera, SceneBvh, gltf};
 use glam::DVec3;
@@ -39,9 +37,9 @@ pub struct SceneSettings {
     /// Initial phase of the points.
     pub phase: Phase,
     /// What is done with light brighter than a picture's white.
-    pub exposure: Exposure,
-    /// What a sequence of frames holds still.
-    pub held: Held,
+    pub white: WhitePoint,
+    /// What a sequence of frames keeps fixed.
+    pub anchors: SequenceAnchors,
 }
 
 impl Default for SceneSettings {
@@ -53,8 +51,8 @@ impl Default for SceneSettings {
             points: None,
             placement: Placement::default(),
             phase: Phase::Random { seed: 1 },
-            exposure: Exposure::Full,
-            held: Held::default(),
+            white: WhitePoint::Unlimited,
+            anchors: SequenceAnchors::default(),
         }
     }
 }
@@ -75,26 +73,9 @@ pub struct Lit {
     /// What a budget of points chose, if there was one.
     pub rays: Option<Rays>,
     /// White, and what is brighter.
-    pub exposed: Exposed,
+    pub white: WhiteLevel,
     /// What had to be assumed.
     pub warnings: Vec<String>,
-}
-
-/// The traced picture and where each of its pixels stands before the panel: the target of every reconstruction.
-#[derive(Clone, Debug)]
-pub struct SceneView {
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Linear RGB radiance, row 0 on top.
-    pub picture: Vec<[f32; 3]>,
-    /// Depth z of each pixel's point in the hologram frame [m]; a pixel without a point has that of the nearest one.
-    pub depths: Vec<Option<f64>>,
-    /// Depths worth focusing on, z [m]: nearest and farthest object, mirror image.
-    pub focus: Vec<(String, f64)>,
-    /// Eye, window and camera.
-    pub placing: Placing,
 }
 
 /// glTF → light on surfaces → points before the panel.
@@ -108,8 +89,8 @@ pub fn light(
     progress.start("scene", 0);
     let loaded = gltf::load(scene, &settings.load)?;
     let camera = loaded.scene.cameras.first().ok_or_else(|| Error::input(scene, "has no camera"))?;
-    let bvh = SceneBvh::new(&loaded.scene);
-    let illumination = Illumination::new(&bvh, settings.illumination, progress)?;
+    let bvh = SceneBvh::new(loaded.scene.clone());
+    let illumination = Illumination::new(bvh, settings.illumination, progress)?;
     seen(scene, (&loaded, camera), &illumination, settings, (panel, wavelength), progress)
 }
 
@@ -123,11 +104,10 @@ pub fn seen(
     progress: &Progress,
 ) -> Result<Lit> {
     let aspect = f64::from(settings.trace.width) / f64::from(settings.trace.height);
-    let placing = settings.placement.prepare_for(&loaded.scene, &settings.held, camera, aspect, panel)?;
-    let cast = |settings: &TraceSettings| trace::trace(illumination, &placing.camera, settings, progress);
+    let placing = settings.placement.prepare_for(&loaded.scene, &settings.anchors, camera, aspect, panel)?;
     let (traced, rays) = match settings.points {
-        None => (cast(&settings.trace)?, None),
-        Some(budget) => within_budget(budget, &settings.trace, cast, &placing, panel, wavelength)?,
+        None => (trace::trace(illumination, &placing.camera, &settings.trace, progress)?, None),
+        Some(budget) => budget.trace(illumination, &settings.trace, &placing, panel, wavelength, progress)?,
     };
     if traced.points.is_empty() {
         let what = if illumination.is_dark() {
@@ -137,62 +117,12 @@ pub fn seen(
         };
         return Err(Error::input(scene, what));
     }
-    let mut world = world_points(&traced);
-    let exposed = settings.exposure.apply(&mut world, &traced.picture)?;
+    let mut world = traced.world_points();
+    let white = settings.white.apply(&mut world, &traced.picture)?;
     let placed = points::place(&world, &placing, settings.phase, panel, wavelength);
     let view = SceneView::new(&traced, &placed, placing);
     let warnings = loaded.warnings.iter().map(ToString::to_string).collect();
-    Ok(Lit { placed, world, view, illumination: *illumination.report(), trace: traced.report, rays, exposed, warnings })
-}
-
-fn world_points(traced: &Traced) -> Vec<WorldPoint> {
-    traced.points.iter().map(|p| WorldPoint { position: p.position, radiance: p.radiance }).collect()
-}
-
-/// Traces a scene into a number of points: a few rays tell what share of them becomes points, and how deep they stand.
-fn within_budget(
-    budget: Budget,
-    settings: &TraceSettings,
-    cast: impl Fn(&TraceSettings) -> Result<Traced>,
-    placing: &Placing,
-    panel: &Grid,
-    wavelength: f64,
-) -> Result<(Traced, Option<Rays>)> {
-    /// Rays of the first look: the share of a shape's area on such a grid is right to a few tenths of a per cent.
-    const PILOT: f64 = 10_000.0;
-    /// What a number of points may be off.
-    const NEAR: f64 = 0.03;
-    let shape = [settings.width, settings.height];
-    let scale = (PILOT / (f64::from(shape[0]) * f64::from(shape[1]))).sqrt().min(1.0);
-    let [width, height] = shape.map(|side| (f64::from(side) * scale).ceil().max(1.0) as u32);
-    let pilot = cast(&TraceSettings { width, height, edge_rays: 1, ..*settings })?;
-    let share = |traced: &Traced| traced.points.len() as f64 / (f64::from(traced.width) * f64::from(traced.height));
-    let placed = points::place(&world_points(&pilot), placing, Phase::Zero, panel, wavelength);
-    let Some(depths) = placed.cloud.depth_range() else { return Ok((pilot, None)) };
-    let resolution = Resolution::new(placing, depths, panel, wavelength);
-    let mut rays = budget.rays(shape, share(&pilot), resolution)?;
-    let mut best: Option<(f64, Traced, Rays)> = None;
-    // Fine structure may fool the first look; the second knows the finer grid's share.
-    for _ in 0..3 {
-        let traced = cast(&TraceSettings { width: rays.size[0], height: rays.size[1], jitter: true, ..*settings })?;
-        let off = match (budget, rays.limit) {
-            (Budget::Points(count), Limit::Budget) => (traced.points.len() as f64 / count as f64).ln().abs(),
-            _ => 0.0,
-        };
-        let next = if off > NEAR && !traced.points.is_empty() {
-            Some(budget.rays(shape, share(&traced), resolution)?).filter(|next| next.size != rays.size)
-        } else {
-            None
-        };
-        if best.as_ref().is_none_or(|(least, ..)| off < *least) {
-            best = Some((off, traced, rays));
-        }
-        match next {
-            Some(next) => rays = next,
-            None => break,
-        }
-    }
-    Ok(best.map_or((pilot, None), |(_, traced, rays)| (traced, Some(rays))))
+    Ok(Lit { placed, world, view, illumination: *illumination.report(), trace: traced.report, rays, white, warnings })
 }
 
 /// Points → field on the panel, by the engine that the planner chooses.
@@ -204,9 +134,19 @@ pub fn field(
     settings: &HologramSettings,
     progress: &Progress,
 ) -> Result<Computed> {
-    let points = cloud.channel(channel);
-    let plan = hologram::plan(&points, panel, wavelength, settings)?;
-    hologram::compute(&points, panel, wavelength, &plan, progress)
+    field_of(&cloud.channel(channel), panel, wavelength, settings, progress)
+}
+
+/// The same for points of one colour.
+pub fn field_of(
+    points: &[PointSource],
+    panel: &Grid,
+    wavelength: f64,
+    settings: &HologramSettings,
+    progress: &Progress,
+) -> Result<Computed> {
+    let plan = hologram::plan(points, panel, wavelength, settings)?;
+    hologram::compute(points, panel, wavelength, &plan, progress)
 }
 
 /// A cloud's fields in the light of three lasers.
@@ -236,41 +176,11 @@ pub fn color_fields(
         if points.iter().all(|p| p.amplitude == 0.0) {
             return Ok(None);
         }
-        let plan = hologram::plan(&points, panel, wavelength, settings)?;
-        hologram::compute(&points, panel, wavelength, &plan, progress).map(Some)
+        field_of(&points, panel, wavelength, settings, progress).map(Some)
     };
     let [red, green, blue] = each;
     let [long, middle, short] = lasers.wavelengths();
     Ok(ColorFields { computed: [one((red, long))?, one((green, middle))?, one((blue, short))?], gamut })
-}
-
-/// How sub-frames that are shown faster than the eye sees share a cloud's light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SubFrames {
-    /// All points in each, with phases of their own: speckle patterns that are averaged, contrast as 1/√N.
-    Phases,
-    /// Every N-th point in each: neighbours do not interfere where their spots overlap.
-    Sparse,
-}
-
-/// Points → the cloud's field in sub-frame `index` of `count`; phases are random by `seed` and sub-frame.
-pub fn sub_field(
-    cloud: &PointCloud,
-    channel: Channel,
-    (index, count, kind, seed): (usize, usize, SubFrames, u64),
-    panel: &Grid,
-    wavelength: f64,
-    settings: &HologramSettings,
-    progress: &Progress,
-) -> Result<Computed> {
-    let mut points = cloud.channel(channel);
-    let stream = seed.wrapping_add(1 + index as u64);
-    points.iter_mut().enumerate().for_each(|(i, p)| p.phase = Random::new(stream, i as u64).phase());
-    if kind == SubFrames::Sparse {
-        points = points.into_iter().skip(index).step_by(count.max(1)).collect();
-    }
-    let plan = hologram::plan(&points, panel, wavelength, settings)?;
-    hologram::compute(&points, panel, wavelength, &plan, progress)
 }
 
 /// Field → frame of drive levels for a panel.
@@ -323,70 +233,4 @@ pub fn run(
     let encoded = frame(&computed.field, profile, settings.2, progress)?;
     let (behind, view) = simulated_light(&encoded.frame, &Simulation::default(), progress)?;
     Ok(Outcome { lit, computed, encoded, behind, aperture: view.aperture })
-}
-
-impl SceneView {
-    fn new(traced: &trace::Traced, placed: &Placed, placing: Placing) -> Self {
-        let mut depths = vec![None; traced.picture.len()];
-        for (point, at) in traced.points.iter().zip(&placed.cloud.points) {
-            depths[point.pixel as usize] = Some(at.position.z);
-        }
-        spread(&mut depths, traced.width as usize);
-        Self {
-            width: traced.width as usize,
-            height: traced.height as usize,
-            picture: traced.picture.clone(),
-            depths,
-            focus: focus_depths(traced, placed),
-            placing,
-        }
-    }
-}
-
-/// Gives pixels without a depth that of the nearest pixel that has one (counted in steps across and down).
-fn spread(depths: &mut [Option<f64>], width: usize) {
-    let mut front: std::collections::VecDeque<usize> = (0..depths.len()).filter(|&i| depths[i].is_some()).collect();
-    while let Some(at) = front.pop_front() {
-        let (column, last) = (at % width, depths.len() - 1);
-        let left = (column > 0).then(|| at - 1);
-        let right = (column + 1 < width && at < last).then(|| at + 1);
-        let (up, down) = (at.checked_sub(width), Some(at + width).filter(|&d| d <= last));
-        for next in [left, right, up, down].into_iter().flatten() {
-            if depths[next].is_none() {
-                depths[next] = depths[at];
-                front.push_back(next);
-            }
-        }
-    }
-}
-
-/// Depths of the nearest and the farthest object that fills at least 1 % of the picture, and of mirror images.
-fn focus_depths(traced: &trace::Traced, placed: &Placed) -> Vec<(String, f64)> {
-    let mut by_object = std::collections::BTreeMap::<u32, Vec<f64>>::new();
-    let mut mirrored = Vec::new();
-    for (point, at) in traced.points.iter().zip(&placed.cloud.points) {
-        if point.bounces > 0 {
-            mirrored.push(at.position.z);
-        } else {
-            by_object.entry(point.instance).or_default().push(at.position.z);
-        }
-    }
-    let enough = traced.points.len() / 100;
-    let median = |depths: &mut Vec<f64>| {
-        depths.sort_by(f64::total_cmp);
-        depths[depths.len() / 2]
-    };
-    let mut objects: Vec<f64> = by_object.values_mut().filter(|d| d.len() > enough).map(median).collect();
-    objects.sort_by(f64::total_cmp);
-    let mut focus = Vec::new();
-    if let (Some(&far), Some(&near)) = (objects.first(), objects.last()) {
-        focus.push(("near".to_string(), near));
-        if far < near {
-            focus.push(("far".to_string(), far));
-        }
-    }
-    if mirrored.len() > enough {
-        focus.push(("mirror".to_string(), median(&mut mirrored)));
-    }
-    focus
 }

@@ -10,6 +10,7 @@ use holodrive::scene::gltf::{LoadOptions, load};
 use holodrive::scene::{Scene, SceneBvh};
 use std::collections::HashMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 fn references() -> Option<PathBuf> {
     let folder = std::env::var_os("HOLODRIVE_ASSETS").map(|assets| PathBuf::from(assets).join("../references"));
@@ -20,14 +21,14 @@ fn references() -> Option<PathBuf> {
     folder
 }
 
-fn scene(name: &str) -> Option<Scene> {
+fn scene(name: &str) -> Option<Arc<Scene>> {
     Some(load(&references()?.join(name), &LoadOptions::default()).expect("reference data is whole").scene)
 }
 
-fn render(scene: &Scene, settings: IlluminationSettings) -> Traced {
-    let bvh = SceneBvh::new(scene);
+fn render(scene: &Arc<Scene>, settings: IlluminationSettings) -> Traced {
+    let bvh = SceneBvh::new(scene.clone());
     let progress = Progress::new();
-    let light = Illumination::new(&bvh, settings, &progress).expect("reference data is whole");
+    let light = Illumination::new(bvh, settings, &progress).expect("reference data is whole");
     eprintln!("{:?}\nimbalance {:+.2e}", light.report(), light.report().energy.imbalance());
     let traced =
         trace(&light, &scene.cameras[0], &TraceSettings::default(), &progress).expect("reference data is whole");

@@ -7,8 +7,8 @@ use holodrive::field::{Complex32, Complex64, Field, npy};
 use holodrive::hologram::HologramSettings;
 use holodrive::panel::calibration::zernike;
 use holodrive::panel::{Curve, Faults, Frame, PanelProfile, Response, Simulation, Wavefront, simulate, wavefront};
-use holodrive::pipeline::{self, SubFrames};
-use holodrive::points::{Channel, PointCloud, PointSource};
+use holodrive::pipeline;
+use holodrive::points::{Channel, Multiplexing, PointCloud, PointSource, SubFrames};
 use holodrive::progress::Progress;
 use holodrive::random::Random;
 use holodrive::reconstruction::metrics::speckle_contrast;
@@ -372,15 +372,13 @@ fn speckle_of_sub_frames_falls_with_the_root_of_their_number() {
         .collect();
     let cloud = PointCloud { points, rgb: None };
     let progress = Progress::new();
-    let seen = |count: usize, kind: SubFrames| -> f64 {
+    let seen = |count: usize, multiplexing: Multiplexing| -> f64 {
+        let subframes = SubFrames { count, multiplexing, seed: 7 };
         let pictures: Vec<Picture> = (0..count)
             .map(|index| {
-                let share = (index, count, kind, 7);
+                let share = subframes.points(&cloud, Channel::Luminance, index);
                 let settings = HologramSettings::default();
-                let field =
-                    pipeline::sub_field(&cloud, Channel::Luminance, share, &grid, WAVELENGTH, &settings, &progress)
-                        .expect("field")
-                        .field;
+                let field = pipeline::field_of(&share, &grid, WAVELENGTH, &settings, &progress).expect("field").field;
                 let settings = EncodeSettings::new(Encoding::named("double-phase").expect("name"));
                 let frame = encode(&field, &profile, &settings, &progress).expect("encode").frame;
                 let (light, view) =
@@ -393,15 +391,15 @@ fn speckle_of_sub_frames_falls_with_the_root_of_their_number() {
             .collect();
         speckle_contrast(&Picture::mean(&pictures).expect("pictures").values)
     };
-    let one = seen(1, SubFrames::Phases);
+    let one = seen(1, Multiplexing::Phases);
     assert!((0.75..1.15).contains(&one), "one frame of random phases has full speckle: {one}");
     for count in [4, 16] {
-        let contrast = seen(count, SubFrames::Phases);
+        let contrast = seen(count, Multiplexing::Phases);
         println!("{count} sub-frames: contrast {contrast:.3}, one {one:.3}");
         // Some six hundred speckles in the window: the contrast scatters by a few per cent.
         assert!((contrast * (count as f64).sqrt() / one - 1.0).abs() < 0.2, "{count}: {contrast} of {one}");
     }
-    let sparse = seen(16, SubFrames::Sparse);
+    let sparse = seen(16, Multiplexing::Sparse);
     println!("16 sparse sub-frames: contrast {sparse:.3}");
     assert!(sparse < 0.6 * one, "{sparse} {one}");
 }

@@ -9,7 +9,7 @@ use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Frame, Illumination, PanelProfile};
 use holodrive::pipeline;
 use holodrive::points::trace::MirrorDepth;
-use holodrive::points::{Placement, PointSource};
+use holodrive::points::{Placement, PointSource, SceneView};
 use holodrive::progress::Progress;
 use holodrive::propagation;
 use holodrive::reconstruction::{self, Picture, View};
@@ -202,7 +202,7 @@ fn blocks(values: &[f32], width: usize, [left, top]: [usize; 2], size: usize, bl
 }
 
 /// Likeness of what a field shows in a square of the picture, at a depth, to what was traced.
-fn likeness(field: &Field, view: &pipeline::SceneView, z: f64, corner: [usize; 2], size: usize) -> f64 {
+fn likeness(field: &Field, view: &SceneView, z: f64, corner: [usize; 2], size: usize) -> f64 {
     let (width, half) = (view.width, view.placing.view_at(z));
     let seen = reconstruction::picture(
         field,
@@ -233,7 +233,7 @@ fn sharp_and_blurred(scene: &std::path::Path, corner: [usize; 2], size: usize) -
     let points = &focus.placed.cloud.points;
     let plan = hologram::plan(points, &grid, WAVELENGTH, &HologramSettings::default()).expect("plan");
     let field = hologram::compute(points, &grid, WAVELENGTH, &plan, &Progress::new()).expect("field").field;
-    let depth = |view: &pipeline::SceneView| {
+    let depth = |view: &SceneView| {
         let pixels = (0..size * size).map(|k| (corner[1] + k / size) * 450 + corner[0] + k % size);
         let mut z: Vec<f64> = pixels.filter_map(|p| view.depths[p]).collect();
         z.sort_by(f64::total_cmp);

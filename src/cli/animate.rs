@@ -13,8 +13,7 @@ use holodrive::field::Grid;
 use holodrive::hologram::HologramSettings;
 use holodrive::panel::simulated::Simulation;
 use holodrive::pipeline;
-use holodrive::points::Placement;
-use holodrive::points::exposure::Exposure;
+use holodrive::points::{Placement, WhitePoint};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::{self, Picture, View};
 use holodrive::sequence::{Animation, ContactSheet, Made};
@@ -95,8 +94,8 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
     report.add("animation_frames", frames, "");
     maker.animation.first_look(&maker.panel.grid, &bar.progress)?;
     let held = &maker.animation.scene;
-    report.add_serialised("held_depths", &held.held.depths, "");
-    report.add("held_white", if let Exposure::White(white) = held.exposure { white } else { 0.0 }, "");
+    report.add_serialised("held_depths", &held.anchors.depths, "");
+    report.add("held_white", if let WhitePoint::At(white) = held.white { white } else { 0.0 }, "");
     let look = begin.elapsed().as_secs_f64();
     let line = format!(
         "first look   {:>8}  {} frames, one camera, depth range and white for all",

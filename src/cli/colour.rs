@@ -204,7 +204,7 @@ pub(super) fn look(
     let size = (lit.view.width, lit.view.height);
     let placing = &lit.view.placing;
     let half_at = |z: f64| placing.view_at(z);
-    let (white, near) = (lit.exposed.white, content.depth.map_or(0.0, |d| d[0]));
+    let (white, near) = (lit.white.white, content.depth.map_or(0.0, |d| d[0]));
     let target = ColorPicture { width: size.0, height: size.1, rgb: lit.view.picture.clone() };
     let step = behind.focus_step(half_at(near), size);
     let (sharp, planes) = behind.all_in_focus(&lit.view.depths, size, half_at, step, progress)?;

@@ -72,7 +72,7 @@ pub(super) fn write_traced(path: &Path, lit: &Lit) -> Result<()> {
     let view = &lit.view;
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         let texts = [("Description", "traced picture, sRGB-coded linear radiance".to_string())];
-        write_rgb_png(path, view.width, view.height, &view.picture, lit.exposed.white, &texts)
+        write_rgb_png(path, view.width, view.height, &view.picture, lit.white.white, &texts)
     } else {
         npy::write_picture(path, view.width, view.height, &view.picture)
     }

@@ -3,9 +3,9 @@
 use super::report::{Report, count, seconds};
 use holodrive::pipeline::Lit;
 use holodrive::points::PointCloud;
+use holodrive::points::WhiteLevel;
 use holodrive::points::budget::{Limit, Rays};
 use holodrive::points::colour::{Gamut, Lasers};
-use holodrive::points::exposure::Exposed;
 use holodrive::units::show_length;
 use serde_json::Value;
 
@@ -66,7 +66,7 @@ pub(super) fn report_light(lit: &Lit, elapsed: f64, report: &mut Report) {
         report_budget(rays, lit, report);
     }
     report_cloud(&lit.placed.cloud, 0.0, report);
-    report_exposure(&lit.exposed, report);
+    report_exposure(&lit.white, report);
     report.add("mirrored_points", trace.by_mirror, "");
     report.add("beyond_cone", lit.placed.beyond_cone, "");
     report.add("beyond_cone_light", lit.placed.beyond_cone_light, "");
@@ -94,7 +94,7 @@ fn report_budget(rays: &Rays, lit: &Lit, report: &mut Report) {
     report.add("", Value::Null, format!("budget                 {across} × {down} rays, {why}; an eye at {viewer} resolves {eye} (1/60°), the panel {panel} (pitch, or λz/D)"));
 }
 
-fn report_exposure(exposed: &Exposed, report: &mut Report) {
+fn report_exposure(exposed: &WhiteLevel, report: &mut Report) {
     report.add_serialised("exposure", exposed, "");
     report.add("white", exposed.white, "");
     report.add("clipped_light", exposed.clipped_light(), "");

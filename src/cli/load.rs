@@ -12,9 +12,9 @@ use holodrive::hologram::{HologramSettings, Method};
 use holodrive::illumination::{FormFactor, IlluminationSettings};
 use holodrive::panel::{PanelProfile, Wavefront, wavefront};
 use holodrive::pipeline::{self, Lit, SceneSettings};
+use holodrive::points::WhitePoint;
 use holodrive::points::colour::Lasers;
-use holodrive::points::exposure::Exposure;
-use holodrive::points::placement::{Held, Phase};
+use holodrive::points::placement::{Phase, SequenceAnchors};
 use holodrive::points::trace::{MirrorDepth, TraceSettings};
 use holodrive::points::{Channel, Placement, PointCloud, images, ply};
 use holodrive::progress::Progress;
@@ -131,12 +131,12 @@ pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, defau
             PhaseArg::Random => Phase::Random { seed: light.seed },
             PhaseArg::Path => Phase::Path,
         },
-        exposure: match placement.white.unwrap_or(default_white) {
-            White::Auto => Exposure::Auto,
-            White::None => Exposure::Full,
-            White::At(value) => Exposure::White(value),
+        white: match placement.white.unwrap_or(default_white) {
+            White::Auto => WhitePoint::Auto,
+            White::None => WhitePoint::Unlimited,
+            White::At(value) => WhitePoint::At(value),
         },
-        held: Held::default(),
+        anchors: SequenceAnchors::default(),
     }
 }
 

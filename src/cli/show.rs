@@ -271,7 +271,7 @@ fn look(
     let placing = &lit.view.placing;
     let half_at = |z: f64| placing.view_at(z);
     let target = luminance_picture(lit);
-    let white = lit.exposed.white;
+    let white = lit.white.white;
 
     let step = reconstruction::focus_step(&field, &settings, half_at(content.depth.map_or(0.0, |d| d[0])), size);
     let (sharp, planes) =

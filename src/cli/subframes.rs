@@ -8,7 +8,8 @@ use super::report::Report;
 use holodrive::field::npy;
 use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Frame, Origin};
-use holodrive::pipeline::{self, SubFrames};
+use holodrive::pipeline;
+use holodrive::points::{Multiplexing, SubFrames};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::{self, Picture, Scale, View};
 use holodrive::{Error, Result};
@@ -44,18 +45,17 @@ pub(super) fn frames(
     report: &mut Report,
 ) -> Result<Vec<Frame>> {
     let settings = hologram_settings(&args.hologram, args.engine);
-    let kind = if args.sparse { SubFrames::Sparse } else { SubFrames::Phases };
-    if kind == SubFrames::Sparse && points.cloud.points.len() < args.subframes {
+    let multiplexing = if args.sparse { Multiplexing::Sparse } else { Multiplexing::Phases };
+    let subframes = SubFrames { count: args.subframes, multiplexing, seed: args.light.seed };
+    if multiplexing == Multiplexing::Sparse && points.cloud.points.len() < args.subframes {
         let what = format!("{} for {} points; one a frame at least", args.subframes, points.cloud.points.len());
         return Err(Error::parameter("subframes", what));
     }
     let content = content(&points.cloud, &points.metadata);
     let mut frames = Vec::new();
     for index in 0..args.subframes {
-        let share = (index, args.subframes, kind, args.light.seed);
-        let at = (&panel.grid, panel.wavelength);
-        let computed =
-            pipeline::sub_field(&points.cloud, channel(&args.hologram), share, at.0, at.1, &settings, progress)?;
+        let share = subframes.points(&points.cloud, channel(&args.hologram), index);
+        let computed = pipeline::field_of(&share, &panel.grid, panel.wavelength, &settings, progress)?;
         let mut part = Report::new("show");
         report_field(&computed, &mut part);
         let origin = Origin {

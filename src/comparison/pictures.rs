@@ -70,7 +70,7 @@ pub fn scene_picture(scene: &Path, profile: &PanelProfile, planes: usize, progre
     };
     let lit = light(scene, &settings, &grid, profile.default_wavelength(), progress)?;
     let view = &lit.view;
-    let white = lit.exposed.white;
+    let white = lit.white.white;
     let values: Vec<f32> =
         view.picture.iter().map(|rgb| Channel::Luminance.of(*rgb).clamp(0.0, white) / white).collect();
     let farthest = view.depths.iter().flatten().fold(0.0f64, |a, &z| a.min(z));

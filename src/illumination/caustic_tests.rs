@@ -3,13 +3,14 @@
 use super::rooms::{Room, glass};
 use super::*;
 use crate::random::Random;
+use crate::scene::Scene;
 use crate::scene::bvh::Ray;
 use crate::scene::{Material, Sides};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-fn lit<'s>(bvh: &'s SceneBvh<'s>, settings: IlluminationSettings) -> Illumination<'s> {
-    Illumination::new(bvh, settings, &Progress::new()).unwrap()
+fn lit(scene: &Scene, settings: IlluminationSettings) -> Illumination {
+    Illumination::new(SceneBvh::new(scene.clone()), settings, &Progress::new()).unwrap()
 }
 
 /// Radiance of a floor of albedo one at a point, as a ray from above it finds it.
@@ -43,8 +44,7 @@ fn a_concave_mirror_gathers_light_in_its_focus() {
     room.quad(DVec3::new(off - side / 2.0, u, -side / 2.0), DVec3::X * side, DVec3::Z * side, lamp);
     let image = [-off * v / u, v];
     room.quad(DVec3::new(image[0] - 0.035, v, -0.035), DVec3::X * 0.07, DVec3::Z * 0.07, white);
-    let bvh = SceneBvh::new(&room.scene);
-    let light = lit(&bvh, IlluminationSettings::default());
+    let light = lit(&room.scene, IlluminationSettings::default());
     // What the lamp sends to the cap, less what the target hides, times the reflectance: by the photons themselves and
     // by a grid over lamp directions.
     let n = 600;
@@ -117,8 +117,7 @@ fn a_glass_ball_focuses_light_on_the_floor() {
     let side = 0.02;
     room.quad(DVec3::new(-side / 2.0, v + u, -side / 2.0), DVec3::X * side, DVec3::Z * side, lamp);
     room.quad(DVec3::new(-0.3, 0.0, -0.3), DVec3::Z * 0.6, DVec3::X * 0.6, white);
-    let bvh = SceneBvh::new(&room.scene);
-    let light = lit(&bvh, IlluminationSettings::default());
+    let light = lit(&room.scene, IlluminationSettings::default());
     // All rings of rays through the ball, exactly: flux against the radius at which they meet the floor.
     let irradiance = 3e4 * side * side / (u * u);
     let rings = 20_000;
@@ -179,13 +178,9 @@ fn a_thin_pane_dims_and_a_half_covered_one_too() {
     });
     room.quad(DVec3::new(-0.01, 0.0, -0.01), DVec3::Z * 0.02, DVec3::X * 0.02, white);
     room.quad(DVec3::new(-0.01, 1.0, -0.01), DVec3::X * 0.02, DVec3::Z * 0.02, lamp);
-    let free = {
-        let bvh = SceneBvh::new(&room.scene);
-        floor_at(&lit(&bvh, IlluminationSettings::default()), 0.0, 0.1, 0.0)
-    };
+    let free = floor_at(&lit(&room.scene, IlluminationSettings::default()), 0.0, 0.1, 0.0);
     room.quad(DVec3::new(-0.1, 0.5, -0.1), DVec3::X * 0.2, DVec3::Z * 0.2, pane);
     let both = 2.0 * 0.04 / 1.04;
-    let bvh = SceneBvh::new(&room.scene);
-    let dimmed = floor_at(&lit(&bvh, IlluminationSettings::default()), 0.0, 0.1, 0.0) / free;
+    let dimmed = floor_at(&lit(&room.scene, IlluminationSettings::default()), 0.0, 0.1, 0.0) / free;
     assert!((dimmed - Vec3::new(0.9, 0.5, 0.1) * (1.0 - both)).abs().max_element() < 1e-3, "{dimmed}");
 }

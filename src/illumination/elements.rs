@@ -11,6 +11,7 @@ use crate::scene::bvh::{Ray, SceneBvh, Sides};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// No element: a side that stores no light.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -116,8 +117,8 @@ pub(crate) struct Fineness {
 
 /// All elements of a scene.
 #[derive(Clone)]
-pub(crate) struct Elements<'s> {
-    scene: &'s Scene,
+pub(crate) struct Elements {
+    scene: Arc<Scene>,
     /// Front and back root of each triangle.
     roots: Vec<[u32; 2]>,
     /// Rotation of the roots' corners against the triangle's.
@@ -128,12 +129,12 @@ pub(crate) struct Elements<'s> {
     shared: HashMap<([u64; 3], [i16; 3], u32), u32>,
 }
 
-impl<'s> Elements<'s> {
+impl Elements {
     /// Meshes every side for which `lit(triangle, front)` holds and refines it round by round.
-    pub(crate) fn new(bvh: &SceneBvh<'s>, fineness: Fineness, seed: u64, lit: impl Fn(u32, bool) -> bool) -> Self {
+    pub(crate) fn new(bvh: &SceneBvh, fineness: Fineness, seed: u64, lit: impl Fn(u32, bool) -> bool) -> Self {
         let scene = bvh.scene();
         let mut mesh = Self {
-            scene,
+            scene: scene.clone(),
             roots: vec![[NONE; 2]; scene.triangles.len()],
             root_rotations: vec![0; scene.triangles.len()],
             nodes: Vec::new(),
@@ -304,7 +305,8 @@ impl<'s> Elements<'s> {
     }
 
     fn plant(&mut self, index: u32, front: bool) {
-        let triangle = &self.scene.triangles[index as usize];
+        let scene = self.scene.clone();
+        let triangle = &scene.triangles[index as usize];
         let side = if front { 1.0 } else { -1.0 };
         let facing = self.facing(index, front);
         let corners: [u32; 3] = std::array::from_fn(|k| {

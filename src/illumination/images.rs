@@ -28,7 +28,7 @@ const STRONG_SHARE: f64 = 0.03;
 /// What a ray meets when it follows light through mirrors.
 #[derive(Clone, Copy)]
 pub(crate) struct Around<'a> {
-    pub(crate) bvh: &'a SceneBvh<'a>,
+    pub(crate) bvh: &'a SceneBvh,
     pub(crate) optics: &'a Optics,
     pub(crate) emitters: &'a Emitters,
 }
@@ -413,10 +413,10 @@ mod tests {
     use crate::scene::{LightKind, Material, Scene, Sides};
 
     fn floor_at(scene: &Scene, x: f64, z: f64) -> Vec3 {
-        let bvh = SceneBvh::new(scene);
-        let light = Illumination::new(&bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
+        let bvh = SceneBvh::new(scene.clone());
+        let light = Illumination::new(bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
         let ray = Ray { origin: DVec3::new(x, 0.05, z), direction: DVec3::NEG_Y };
-        let hit = bvh.nearest(&ray, 0.0, Sides::Front).unwrap();
+        let hit = light.bvh().nearest(&ray, 0.0, Sides::Front).unwrap();
         light.radiance(&hit, &Surface::at(scene, &hit, 0.0), 1, &mut Random::new(3, 3))
     }
 

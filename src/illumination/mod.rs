@@ -51,6 +51,7 @@ use patches::Patches;
 use paths::Optics;
 use radiosity::{Surroundings, Transport};
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// How light is computed.
@@ -168,11 +169,11 @@ const MOST_GATHERING_RAYS: usize = 8_000_000;
 const MOST_PLACES: usize = 400;
 
 /// A lit scene.
-pub struct Illumination<'s> {
-    bvh: &'s SceneBvh<'s>,
+pub struct Illumination {
+    bvh: Arc<SceneBvh>,
     settings: IlluminationSettings,
     emitters: Emitters,
-    mesh: Elements<'s>,
+    mesh: Elements,
     optics: Optics,
     images: Images,
     caustics: Caustics,
@@ -186,13 +187,15 @@ pub struct Illumination<'s> {
     report: IlluminationReport,
 }
 
-impl<'s> Illumination<'s> {
+impl Illumination {
     /// Lights a scene.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a setting outside its domain, [`Error::Interrupted`] when asked to stop.
-    pub fn new(bvh: &'s SceneBvh<'s>, settings: IlluminationSettings, progress: &Progress) -> Result<Self> {
+    pub fn new(bvh: impl Into<Arc<SceneBvh>>, settings: IlluminationSettings, progress: &Progress) -> Result<Self> {
         settings.check()?;
+        let owned = bvh.into();
+        let bvh = &*owned;
         let begin = Instant::now();
         let scene = bvh.scene();
         let emitters = Emitters::new(scene, settings.form_factor);
@@ -245,7 +248,7 @@ impl<'s> Illumination<'s> {
         let energy = patches.energy(&surroundings, &emitters, &transport, &leaving, &irradiance, settings.seed);
         let irradiance = irradiance.iter().zip(&weak).map(|(i, w)| *i + *w).collect();
         let mut light = Self {
-            bvh,
+            bvh: owned,
             settings,
             emitters,
             mesh,
@@ -278,8 +281,8 @@ impl<'s> Illumination<'s> {
     }
 
     /// The ray caster that the light was computed with.
-    pub fn bvh(&self) -> &'s SceneBvh<'s> {
-        self.bvh
+    pub fn bvh(&self) -> &Arc<SceneBvh> {
+        &self.bvh
     }
 
     /// Whether nothing shines at all: neither a sampled emitter, nor a weak one, nor a punctual light.
@@ -288,11 +291,11 @@ impl<'s> Illumination<'s> {
     }
 
     fn surroundings(&self) -> Surroundings<'_> {
-        Surroundings { bvh: self.bvh, mesh: &self.mesh, senders: &self.senders, optics: &self.optics }
+        Surroundings { bvh: &self.bvh, mesh: &self.mesh, senders: &self.senders, optics: &self.optics }
     }
 
     fn around(&self) -> Around<'_> {
-        Around { bvh: self.bvh, optics: &self.optics, emitters: &self.emitters }
+        Around { bvh: &self.bvh, optics: &self.optics, emitters: &self.emitters }
     }
 }
 

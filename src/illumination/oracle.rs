@@ -10,6 +10,7 @@ use super::surface::Surface;
 use crate::random::Random;
 use crate::scene::bvh::{Ray, SceneBvh, Sides};
 use glam::Vec3;
+use std::sync::Arc;
 
 /// Surfaces after which a path may be ended by chance, its weight raised in turn.
 const SURE: u32 = 4;
@@ -17,15 +18,16 @@ const SURE: u32 = 4;
 const MOST: u32 = 1000;
 
 /// A plain path tracer.
-pub struct Oracle<'s> {
-    bvh: &'s SceneBvh<'s>,
+pub struct Oracle {
+    bvh: Arc<SceneBvh>,
     optics: Optics,
 }
 
-impl<'s> Oracle<'s> {
+impl Oracle {
     /// For a scene without punctual lights: no path meets those by chance.
-    pub fn new(bvh: &'s SceneBvh<'s>) -> Self {
-        Self { bvh, optics: Optics::new(bvh.scene(), MOST, 0) }
+    pub fn new(bvh: impl Into<Arc<SceneBvh>>) -> Self {
+        let bvh = bvh.into();
+        Self { optics: Optics::new(bvh.scene(), MOST, 0), bvh }
     }
 
     /// Radiance that one path finds along an eye's ray [W/(m² sr)]: its mean over many is the truth.
@@ -42,7 +44,7 @@ impl<'s> Oracle<'s> {
             }
             sum += weight * surface.emission * surface.coverage;
             let way = match self.optics.optical[hit.triangle as usize] {
-                true => self.optics.next(self.bvh, &ray, &meeting, random),
+                true => self.optics.next(&self.bvh, &ray, &meeting, random),
                 false => Continuation::Diffuse(Vec3::ONE),
             };
             match way {

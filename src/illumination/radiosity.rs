@@ -36,8 +36,8 @@ const BLACK: u32 = NONE;
 /// The surfaces that gathering rays meet.
 #[derive(Clone, Copy)]
 pub(crate) struct Surroundings<'a> {
-    pub(crate) bvh: &'a SceneBvh<'a>,
-    pub(crate) mesh: &'a Elements<'a>,
+    pub(crate) bvh: &'a SceneBvh,
+    pub(crate) mesh: &'a Elements,
     pub(crate) senders: &'a Senders,
     pub(crate) optics: &'a Optics,
 }

@@ -19,7 +19,7 @@ struct Place {
     weights: [f32; 3],
 }
 
-impl Illumination<'_> {
+impl Illumination {
     /// Radiance that a surface's diffuse part and its emission send out at a hit [W/(m² sr)].
     ///
     /// `share` is the number of looks whose mean is taken: each then samples lamps and surroundings with that part of the
@@ -45,7 +45,7 @@ impl Illumination<'_> {
             1 => ShadowRays { first, penumbra, clear },
             _ => ShadowRays { first: (first + penumbra).div_ceil(share), penumbra: 0, clear },
         };
-        let straight = self.emitters.light(self.bvh, &self.optics, point, surface.normal, rays, random);
+        let straight = self.emitters.light(&self.bvh, &self.optics, point, surface.normal, rays, random);
         let rays = ShadowRays { first: rays.first.div_ceil(2), penumbra: rays.penumbra / 2, ..rays };
         let mirrored = self.images.strong(self.around(), point, surface.normal, rays, random);
         straight + mirrored + self.caustics.light(surface.position, surface.facing)

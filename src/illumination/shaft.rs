@@ -87,7 +87,7 @@ mod tests {
             let facing = (piece[1] - piece[0]).cross(piece[2] - piece[0]).normalize();
             let shining = (lamp[1] - lamp[0]).cross(lamp[2] - lamp[0]).normalize();
             let shining = if shining.dot(piece[0] - lamp[0]) > 0.0 { shining } else { -shining };
-            let bvh = SceneBvh::new(&room.scene);
+            let bvh = SceneBvh::new(room.scene.clone());
             let Some(shaft) = Shaft::new(&piece, facing, &lamp, shining, 1e-9) else { continue };
             let mut hidden = 0;
             for _ in 0..2000 {

@@ -8,8 +8,8 @@ use crate::scene::{LightKind, Material, PunctualLight, Scene, Sides};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-fn lit<'s>(bvh: &'s SceneBvh<'s>, settings: IlluminationSettings) -> Illumination<'s> {
-    Illumination::new(bvh, settings, &Progress::new()).unwrap()
+fn lit(scene: &Scene, settings: IlluminationSettings) -> Illumination {
+    Illumination::new(SceneBvh::new(scene.clone()), settings, &Progress::new()).unwrap()
 }
 
 /// Radiance seen from a point along a direction.
@@ -49,8 +49,7 @@ fn furnaces_reach_their_radiance() {
         let m = room.material(glowing([rho, 0.5 * rho, 0.9], [1.0, 0.5, 0.1]));
         room.cuboid(DVec3::ZERO, DVec3::new(2.0, 1.0, 1.5), true, [m; 6]);
         room.cuboid(DVec3::new(0.9, 0.2, 0.5), DVec3::new(1.2, 0.6, 0.8), false, [m; 6]);
-        let bvh = SceneBvh::new(&room.scene);
-        let light = lit(&bvh, IlluminationSettings { shadow_rays: 256, ..IlluminationSettings::default() });
+        let light = lit(&room.scene, IlluminationSettings { shadow_rays: 256, ..IlluminationSettings::default() });
         let rho = f64::from(rho);
         let expected = [1.0 / (1.0 - rho), 0.5 / (1.0 - 0.5 * rho), 1.0];
         let all = panorama(&light, DVec3::new(0.3, 0.4, 0.4));
@@ -70,8 +69,7 @@ fn a_cube_with_one_glowing_wall() {
     let mut room = Room::default();
     let (dark, bright) = (room.material(glowing([0.5; 3], [0.0; 3])), room.material(glowing([0.5; 3], [1.0; 3])));
     room.cuboid(DVec3::ZERO, DVec3::ONE, true, [dark, dark, dark, bright, dark, dark]);
-    let bvh = SceneBvh::new(&room.scene);
-    let light = lit(&bvh, IlluminationSettings::default());
+    let light = lit(&room.scene, IlluminationSettings::default());
     let n = 12;
     let mut faces = [Vec3::ZERO; 6];
     for (axis, face) in (0..3).flat_map(|a| [(a, 0usize), (a, 1)]) {
@@ -110,9 +108,8 @@ fn a_sphere_mixes_light_evenly() {
             cap += t.area();
         }
     }
-    let bvh = SceneBvh::new(scene);
     // Single points are looked at: more rays than the noise of a picture needs.
-    let light = lit(&bvh, IlluminationSettings { indirect_rays: 4096, ..IlluminationSettings::default() });
+    let light = lit(&room.scene, IlluminationSettings { indirect_rays: 4096, ..IlluminationSettings::default() });
     let around = cap / total / (1.0 - 0.6) * 0.6;
     for d in [DVec3::X, DVec3::NEG_Y, DVec3::new(-0.3, -0.4, 0.9), DVec3::new(0.1, 0.3, -1.0)] {
         close(seen(&light, DVec3::ZERO, d), [around; 3], 1.5e-2);
@@ -142,8 +139,7 @@ fn light_under_a_lamp_and_behind_a_blocker() {
     };
     fan(&mut room, 1.0, 1.0, lamp);
     fan(&mut room, 0.2, 0.4, black);
-    let bvh = SceneBvh::new(&room.scene);
-    let light = lit(&bvh, IlluminationSettings { shadow_rays: 4096, ..IlluminationSettings::default() });
+    let light = lit(&room.scene, IlluminationSettings { shadow_rays: 4096, ..IlluminationSettings::default() });
     let down = |x: f64| seen(&light, DVec3::new(x, 0.3, 1e-3), DVec3::NEG_Y);
     close(down(1e-3), [0.3; 3], 1e-2);
 }
@@ -156,8 +152,7 @@ fn an_empty_cornell_room_is_lit_directly_as_the_closed_form_says() {
     let lamp = room.material(Material::emitter(Vec3::new(17.0, 12.0, 4.0)));
     room.quad(DVec3::ZERO, DVec3::Z * 0.5592, DVec3::X * 0.5528, white);
     room.quad(DVec3::new(0.213, 0.5488, 0.227), DVec3::X * 0.13, DVec3::Z * 0.105, lamp);
-    let bvh = SceneBvh::new(&room.scene);
-    let light = lit(&bvh, IlluminationSettings::default());
+    let light = lit(&room.scene, IlluminationSettings::default());
     assert_eq!(light.report().emitters, 1, "two triangles of a rectangle are one emitter");
     for (x, z, expected) in [
         (0.278, 0.2795, [0.175_100_756_508_359, 0.121_043_281_578_192_16, 0.038_642_925_574_258_54]),
@@ -174,9 +169,8 @@ fn the_papers_form_factor_halves_each_transfer() {
     let mut room = Room::default();
     let m = room.material(glowing([0.5; 3], [1.0; 3]));
     room.cuboid(DVec3::ZERO, DVec3::ONE, true, [m; 6]);
-    let bvh = SceneBvh::new(&room.scene);
     let settings = IlluminationSettings { form_factor: FormFactor::Paper, ..IlluminationSettings::default() };
-    let light = lit(&bvh, settings);
+    let light = lit(&room.scene, settings);
     // Half of the flux is lost at each transfer: E/(1 − ρ/2), not E/(1 − ρ).
     close(seen(&light, DVec3::splat(0.5), DVec3::new(0.2, -1.0, 0.1)), [1.0 / 0.75; 3], 5e-3);
 }
@@ -194,8 +188,7 @@ fn punctual_lights_follow_their_laws() {
         range: f32::INFINITY,
     };
     let floor_at = |scene: &Scene, x: f64| {
-        let bvh = SceneBvh::new(scene);
-        let light = lit(&bvh, IlluminationSettings::default());
+        let light = lit(scene, IlluminationSettings::default());
         seen(&light, DVec3::new(x, 1.0, 0.1), DVec3::NEG_Y)
     };
     room.scene.lights = vec![lamp(LightKind::Point, 8.0)];
@@ -220,8 +213,7 @@ fn walls_without_thickness_keep_light_in() {
     room.cuboid(DVec3::ZERO, DVec3::new(2.0, 1.0, 1.0), true, [white; 6]);
     room.quad(DVec3::new(0.93, 0.0, 0.0), DVec3::Z, DVec3::Y, sheet);
     room.quad(DVec3::new(0.3, 0.999, 0.4), DVec3::X * 0.2, DVec3::Z * 0.2, lamp);
-    let bvh = SceneBvh::new(&room.scene);
-    let light = lit(&bvh, IlluminationSettings::default());
+    let light = lit(&room.scene, IlluminationSettings::default());
     let bright = seen(&light, DVec3::new(0.5, 0.5, 0.5), DVec3::NEG_Y).x;
     for i in 0..40 {
         let x = 0.931 + 0.02 * f64::from(i);
@@ -238,13 +230,10 @@ fn an_emitter_that_looks_away_and_a_dark_scene() {
     let white = room.material(Material::diffuse(Vec3::ONE));
     let lamp = room.material(Material::emitter(Vec3::ONE));
     room.quad(DVec3::new(-1.0, 0.0, -1.0), DVec3::Z * 2.0, DVec3::X * 2.0, white);
-    let bvh = SceneBvh::new(&room.scene);
-    assert!(lit(&bvh, IlluminationSettings::default()).is_dark());
-    drop(bvh);
+    assert!(lit(&room.scene, IlluminationSettings::default()).is_dark());
     // u × v = +y: it shines upwards, away from the floor.
     room.quad(DVec3::new(-0.5, 1.0, -0.5), DVec3::Z, DVec3::X, lamp);
-    let bvh = SceneBvh::new(&room.scene);
-    let light = lit(&bvh, IlluminationSettings::default());
+    let light = lit(&room.scene, IlluminationSettings::default());
     assert!(!light.is_dark());
     assert_eq!(seen(&light, DVec3::new(0.0, 0.5, 0.0), DVec3::NEG_Y), Vec3::ZERO);
     let energy = light.report().energy;
@@ -259,11 +248,10 @@ fn threads_do_not_change_the_light() {
     room.cuboid(DVec3::ZERO, DVec3::ONE, true, [m; 6]);
     room.cuboid(DVec3::splat(0.3), DVec3::splat(0.5), false, [m; 6]);
     room.quad(DVec3::new(0.4, 0.99, 0.4), DVec3::X * 0.2, DVec3::Z * 0.2, lamp);
-    let bvh = SceneBvh::new(&room.scene);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            lit(&bvh, IlluminationSettings { indirect_rays: 256, ..IlluminationSettings::default() }).irradiance
+            lit(&room.scene, IlluminationSettings { indirect_rays: 256, ..IlluminationSettings::default() }).irradiance
         })
     };
     assert_eq!(with(1), with(3));
@@ -271,9 +259,7 @@ fn threads_do_not_change_the_light() {
 
 #[test]
 fn settings_outside_their_domain_are_refused() {
-    let scene = Scene::default();
-    let bvh = SceneBvh::new(&scene);
-    let refused = |settings| Illumination::new(&bvh, settings, &Progress::new()).is_err();
+    let refused = |settings| Illumination::new(SceneBvh::new(Scene::default()), settings, &Progress::new()).is_err();
     let good = IlluminationSettings::default();
     assert!(refused(IlluminationSettings { residual: f64::NAN, ..good }));
     assert!(refused(IlluminationSettings { shadow_rays: 0, ..good }));

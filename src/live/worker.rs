@@ -166,9 +166,9 @@ impl Job {
         let tell = |happened| drop(told.send(happened));
         let mut loaded = first;
         let mut done = 0;
-        // The light of one scene borrows the scene: another scene begins the loop again.
+        // The light belongs to one scene: another scene begins the loop again.
         'scenes: loop {
-            let bvh = SceneBvh::new(&loaded.scene);
+            let bvh = Arc::new(SceneBvh::new(loaded.scene.clone()));
             let mut lights: [Option<Illumination>; 2] = [None, None];
             loop {
                 let next = desk.next(|order| {
@@ -212,12 +212,12 @@ impl Job {
         Ok((file.files(), loaded))
     }
 
-    fn compute<'a>(
+    fn compute(
         &self,
         detail: Detail,
         (wish, version, since): (&Wish, u64, Instant),
-        (loaded, bvh): (&'a gltf::Loaded, &'a SceneBvh<'a>),
-        lights: &mut [Option<Illumination<'a>>; 2],
+        (loaded, bvh): (&gltf::Loaded, &Arc<SceneBvh>),
+        lights: &mut [Option<Illumination>; 2],
         progress: &Progress,
     ) -> Result<Refined> {
         let begin = Instant::now();
@@ -225,7 +225,7 @@ impl Job {
         let light = &mut lights[usize::from(detail != Detail::Coarse)];
         let light = match light {
             Some(light) => light,
-            None => light.insert(Illumination::new(bvh, settings.illumination, progress)?),
+            None => light.insert(Illumination::new(bvh.clone(), settings.illumination, progress)?),
         };
         let camera = loaded.scene.cameras.first().ok_or_else(|| Error::input(&self.path, "has no camera"))?;
         let camera = turned(camera, loaded, wish.turn);

@@ -7,14 +7,22 @@
 //! - the *panel* separates spots of max(p, λ|z|/D) at depth z, with its pitch p and extent D: λ/(2 sin θ) with either the
 //!   whole cone sin θ = λ/2p of a pixel or, far from the panel, the cone of the whole panel.
 
-use super::placement::Placing;
+use super::placement::{Phase, Placing, place};
+use super::trace::{TraceSettings, Traced, trace};
 use crate::error::{Error, Result};
 use crate::field::Grid;
+use crate::illumination::Illumination;
+use crate::progress::Progress;
 use glam::DVec2;
 use serde::Serialize;
 
 /// Angle that a healthy eye separates [rad]: one minute of arc.
 pub const EYE_ANGLE: f64 = std::f64::consts::PI / 180.0 / 60.0;
+
+/// Rays of the first look: the share of a shape's area on such a grid is right to a few tenths of a per cent.
+const PILOT: f64 = 10_000.0;
+/// What a number of points may be off.
+const NEAR: f64 = 0.03;
 
 /// How many points a scene should become.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,6 +84,54 @@ impl Resolution {
 }
 
 impl Budget {
+    /// Traces a scene into this number of points: a few rays tell what share of them becomes points, and how deep they
+    /// stand. Of `settings` only the shape of the grid is kept. No grid is returned where no ray meets light.
+    ///
+    /// # Errors
+    /// As [`trace`] and [`Budget::rays`].
+    pub fn trace(
+        self,
+        light: &Illumination,
+        settings: &TraceSettings,
+        placing: &Placing,
+        panel: &Grid,
+        wavelength: f64,
+        progress: &Progress,
+    ) -> Result<(Traced, Option<Rays>)> {
+        let cast = |settings: &TraceSettings| trace(light, &placing.camera, settings, progress);
+        let shape = [settings.width, settings.height];
+        let scale = (PILOT / (f64::from(shape[0]) * f64::from(shape[1]))).sqrt().min(1.0);
+        let [width, height] = shape.map(|side| (f64::from(side) * scale).ceil().max(1.0) as u32);
+        let pilot = cast(&TraceSettings { width, height, edge_rays: 1, ..*settings })?;
+        let share = |traced: &Traced| traced.points.len() as f64 / (f64::from(traced.width) * f64::from(traced.height));
+        let placed = place(&pilot.world_points(), placing, Phase::Zero, panel, wavelength);
+        let Some(depths) = placed.cloud.depth_range() else { return Ok((pilot, None)) };
+        let resolution = Resolution::new(placing, depths, panel, wavelength);
+        let mut rays = self.rays(shape, share(&pilot), resolution)?;
+        let mut best: Option<(f64, Traced, Rays)> = None;
+        // Fine structure may fool the first look; the second knows the finer grid's share.
+        for _ in 0..3 {
+            let traced = cast(&TraceSettings { width: rays.size[0], height: rays.size[1], jitter: true, ..*settings })?;
+            let off = match (self, rays.limit) {
+                (Self::Points(count), Limit::Budget) => (traced.points.len() as f64 / count as f64).ln().abs(),
+                _ => 0.0,
+            };
+            let next = if off > NEAR && !traced.points.is_empty() {
+                Some(self.rays(shape, share(&traced), resolution)?).filter(|next| next.size != rays.size)
+            } else {
+                None
+            };
+            if best.as_ref().is_none_or(|(least, ..)| off < *least) {
+                best = Some((off, traced, rays));
+            }
+            match next {
+                Some(next) => rays = next,
+                None => break,
+            }
+        }
+        Ok(best.map_or((pilot, None), |(_, traced, rays)| (traced, Some(rays))))
+    }
+
     /// The grid of rays of the shape width : height that gives the points when a share `lit` of the rays becomes one
     /// (more than 1 where rays give several).
     ///

@@ -62,7 +62,7 @@ impl Seen {
 
 /// An eye before a lit scene.
 pub(crate) struct Eye<'a> {
-    light: &'a Illumination<'a>,
+    light: &'a Illumination,
     camera: &'a Camera,
     settings: &'a TraceSettings,
     aspect: f64,
@@ -88,7 +88,7 @@ struct Branch {
 
 impl<'a> Eye<'a> {
     /// An eye that sees a lit scene through a camera.
-    pub(crate) fn new(light: &'a Illumination<'a>, camera: &'a Camera, settings: &'a TraceSettings) -> Self {
+    pub(crate) fn new(light: &'a Illumination, camera: &'a Camera, settings: &'a TraceSettings) -> Self {
         let aspect = f64::from(settings.width) / f64::from(settings.height);
         let (_, half_height) = camera.half_size(aspect);
         Self { light, camera, settings, aspect, pixel: 2.0 * half_height / f64::from(settings.height) }

@@ -13,10 +13,10 @@ use rayon::prelude::*;
 
 /// Means over squares of pixels by this crate and by plain paths, at a few places of a picture.
 pub(crate) fn agrees(room: &Room, camera: &Camera, squares: &[[f64; 2]], paths: u32, tolerance: f64) {
-    let bvh = SceneBvh::new(&room.scene);
-    let light = Illumination::new(&bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
+    let bvh = SceneBvh::new(room.scene.clone());
+    let light = Illumination::new(bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
     eprintln!("{:?}", light.report());
-    let oracle = Oracle::new(&bvh);
+    let oracle = Oracle::new(light.bvh().clone());
     let settings = TraceSettings { width: 1000, height: 1000, ..TraceSettings::default() };
     let eye = Eye::new(&light, camera, &settings);
     let half = 0.012;
@@ -108,8 +108,8 @@ fn a_mirror_ball_a_glass_ball_and_a_block_agree_with_plain_paths() {
 
 /// Depth of the strongest point nearest to the picture's middle.
 fn depth_in_the_middle(scene: &Scene, camera: &Camera, mirror_depth: MirrorDepth, offset: u32) -> f64 {
-    let bvh = SceneBvh::new(scene);
-    let light = Illumination::new(&bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
+    let bvh = SceneBvh::new(scene.clone());
+    let light = Illumination::new(bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
     let settings = TraceSettings { width: 101, height: 101, mirror_depth, ..TraceSettings::default() };
     let traced = trace(&light, camera, &settings, &Progress::new()).unwrap();
     let middle = 50 * 101 + 50 + offset;
@@ -171,8 +171,8 @@ fn glass_gives_two_points_on_one_ray() {
     room.quad(DVec3::new(-0.5, -0.5, -0.5), DVec3::new(1.0, 0.0, -1.0), DVec3::Y, pane);
     room.quad(DVec3::new(-1.0, -1.0, -3.0), DVec3::X * 2.0, DVec3::Y * 2.0, green);
     room.quad(DVec3::new(2.0, -1.0, -3.0), DVec3::Z * 4.0, DVec3::Y * 2.0, red);
-    let bvh = SceneBvh::new(&room.scene);
-    let light = Illumination::new(&bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
+    let bvh = SceneBvh::new(room.scene.clone());
+    let light = Illumination::new(bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
     let camera = Camera::looking_at(DVec3::new(0.0, 0.0, 0.0), DVec3::NEG_Z, 0.1);
     let settings = TraceSettings { width: 9, height: 9, ..TraceSettings::default() };
     let traced = trace(&light, &camera, &settings, &Progress::new()).unwrap();

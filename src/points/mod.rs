@@ -2,7 +2,6 @@
 
 pub mod budget;
 pub mod colour;
-pub mod exposure;
 mod eye;
 #[cfg(test)]
 mod eye_tests;
@@ -12,11 +11,17 @@ mod odd_tests;
 pub mod placement;
 pub mod ply;
 pub mod slices;
+pub mod subframes;
 pub mod trace;
+pub mod view;
 mod wavefront;
+pub mod white;
 
 pub use placement::{Placed, Placement, place};
+pub use subframes::{Multiplexing, SubFrames};
 pub use trace::{TraceSettings, Traced, TracedPoint, trace};
+pub use view::SceneView;
+pub use white::{WhiteLevel, WhitePoint};
 
 use glam::DVec3;
 

@@ -9,8 +9,8 @@ use crate::scene::{Camera, Material, Scene, SceneBvh};
 use glam::{DVec3, Vec3};
 
 fn traced(scene: &Scene, camera: &Camera) -> Traced {
-    let bvh = SceneBvh::new(scene);
-    let light = Illumination::new(&bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
+    let bvh = SceneBvh::new(scene.clone());
+    let light = Illumination::new(bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
     let settings = TraceSettings { width: 31, height: 31, ..TraceSettings::default() };
     let traced = trace(&light, camera, &settings, &Progress::new()).unwrap();
     assert!(traced.picture.iter().flatten().all(|v| v.is_finite() && *v >= 0.0));

@@ -61,7 +61,7 @@ pub enum Phase {
 /// What does not change from frame to frame of a sequence, so that what stands still in the scene stands still before
 /// the panel. `None`: what the one scene at hand says.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Held {
+pub struct SequenceAnchors {
     /// Box of the scene in all its poses (low, high) [m]: what a camera that the file lacks frames, and what is fitted.
     pub bounds: Option<(DVec3, DVec3)>,
     /// Camera distances [m] that stand at the nearest and farthest depth of a window; points beyond stand there too.
@@ -114,7 +114,7 @@ impl Placement {
     /// # Errors
     /// [`Error::Parameter`] for an eye that is not in front of panel and points, or an inverted depth range.
     pub fn prepare(&self, scene: &Scene, camera: &Camera, picture_aspect: f64, panel: &Grid) -> Result<Placing> {
-        self.prepare_for(scene, &Held::default(), camera, picture_aspect, panel)
+        self.prepare_for(scene, &SequenceAnchors::default(), camera, picture_aspect, panel)
     }
 
     /// As [`Placement::prepare`], with what is held still over the frames of a sequence.
@@ -124,7 +124,7 @@ impl Placement {
     pub fn prepare_for(
         &self,
         scene: &Scene,
-        held: &Held,
+        anchors: &SequenceAnchors,
         camera: &Camera,
         picture_aspect: f64,
         panel: &Grid,
@@ -148,7 +148,7 @@ impl Placement {
                     let what = format!("near {near} m and far {far} m (z): far must be at or behind near");
                     return Err(Error::parameter("near/far", what));
                 }
-                let map = Map::Window { near, far, held: held.depths };
+                let map = Map::Window { near, far, held: anchors.depths };
                 Ok(Placing {
                     camera: camera.clone(),
                     aspect: picture_aspect,
@@ -159,7 +159,7 @@ impl Placement {
             }
             Self::Model { eye, z, scale } => {
                 let axes = DMat3::from_mat4(camera.world_from_camera);
-                let (center, half) = box_along(scene, held.bounds, axes)
+                let (center, half) = box_along(scene, anchors.bounds, axes)
                     .ok_or_else(|| Error::parameter("placement", "the scene has no triangles to place"))?;
                 let scale = match scale {
                     Some(scale) if scale.is_finite() && scale > 0.0 => scale,

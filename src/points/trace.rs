@@ -9,6 +9,7 @@
 use crate::error::{Error, Result};
 use crate::illumination::Illumination;
 use crate::points::eye::{Eye, Seen};
+use crate::points::placement::WorldPoint;
 use crate::progress::Progress;
 use crate::random::Random;
 use crate::scene::Camera;
@@ -96,6 +97,13 @@ pub struct Traced {
     pub points: Vec<TracedPoint>,
     /// Counts and time.
     pub report: TraceReport,
+}
+
+impl Traced {
+    /// The points as a placement takes them.
+    pub fn world_points(&self) -> Vec<WorldPoint> {
+        self.points.iter().map(|p| WorldPoint { position: p.position, radiance: p.radiance }).collect()
+    }
 }
 
 /// What tracing took.
@@ -234,8 +242,8 @@ mod tests {
     use crate::scene::{Material, Scene, SceneBvh};
 
     fn traced(scene: &Scene, camera: &Camera, settings: &TraceSettings) -> Traced {
-        let bvh = SceneBvh::new(scene);
-        let light = Illumination::new(&bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
+        let bvh = SceneBvh::new(scene.clone());
+        let light = Illumination::new(bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
         trace(&light, camera, settings, &Progress::new()).unwrap()
     }
 
@@ -354,8 +362,8 @@ mod tests {
         let settings = TraceSettings { width: 4, height: 3, ..TraceSettings::default() };
         let empty = traced(&scene, &camera, &settings);
         assert!(empty.points.is_empty() && empty.picture.iter().all(|p| *p == [0.0; 3]));
-        let bvh = SceneBvh::new(&scene);
-        let light = Illumination::new(&bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
+        let bvh = SceneBvh::new(scene.clone());
+        let light = Illumination::new(bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
         assert!(trace(&light, &camera, &TraceSettings { width: 0, ..settings }, &Progress::new()).is_err());
         let stopped = Progress::new();
         stopped.stop();

@@ -11,8 +11,7 @@ use super::slit::{LinePoint, Strip};
 use super::views::{Source, Views};
 use crate::error::Result;
 use crate::points::PointSource;
-use crate::points::exposure::Exposure;
-use crate::points::placement::WorldPoint;
+use crate::points::WhitePoint;
 use crate::points::trace;
 use crate::progress::Progress;
 use crate::random::Random;
@@ -76,9 +75,8 @@ impl Views<'_> {
             progress,
         )?;
         let pixel = 2.0 * tall / f64::from(traced.height);
-        let mut seen: Vec<WorldPoint> =
-            traced.points.iter().map(|p| WorldPoint { position: p.position, radiance: p.radiance }).collect();
-        Exposure::White(self.white()).apply(&mut seen, &[])?;
+        let mut seen = traced.world_points();
+        WhitePoint::At(self.white()).apply(&mut seen, &[])?;
         let axis = DVec3::new(0.0, sine, cosine);
         let spot = self.spot();
         let mut cells: Vec<(u64, f64)> = Vec::with_capacity(seen.len());

@@ -167,14 +167,14 @@ impl Task {
         };
         let loaded = gltf::load(&self.input, &options)?;
         let camera = loaded.scene.cameras.first().ok_or_else(|| Error::input(&self.input, "has no camera"))?;
-        let bvh = SceneBvh::new(&loaded.scene);
+        let bvh = SceneBvh::new(loaded.scene.clone());
         let settings = IlluminationSettings {
             bounces: self.bounces,
             photons: self.photons,
             seed: plate.seed,
             ..IlluminationSettings::default()
         };
-        let light = Illumination::new(&bvh, settings, progress)?;
+        let light = Illumination::new(bvh, settings, progress)?;
         if light.is_dark() {
             return Err(Error::input(&self.input, "its lights give no light; raise their intensity or emission"));
         }

@@ -169,8 +169,8 @@ fn strip() -> Room {
 #[test]
 fn segments_see_truly_and_neighbours_send_the_same_points() {
     let room = strip();
-    let bvh = SceneBvh::new(&room.scene);
-    let light = Illumination::new(&bvh, IlluminationSettings::default(), &Progress::new()).expect("light");
+    let bvh = SceneBvh::new(room.scene.clone());
+    let light = Illumination::new(bvh, IlluminationSettings::default(), &Progress::new()).expect("light");
     let camera = Camera::looking_at(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, 0.7);
     let mut plate = plate("[640, 384]", "bits = 8\ntile = 128\nsegment = 64", "angle = [\"9.1deg\", \"0deg\"]");
     // A millimetre a metre: the lamp is 2 mm wide at z = −2.5 mm, the strip stands at z = −1.5 mm.

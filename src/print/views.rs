@@ -21,9 +21,9 @@ use super::reference::Band;
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::illumination::Illumination;
-use crate::points::exposure::{Exposure, white_level};
-use crate::points::placement::{Placement, WorldPoint};
+use crate::points::Placement;
 use crate::points::trace::{self, TraceSettings};
+use crate::points::white::{WhitePoint, white_level};
 use crate::points::{Channel, PointSource};
 use crate::progress::Progress;
 use crate::random::Random;
@@ -42,7 +42,7 @@ pub enum Source<'a> {
 
 /// A lit scene that stands before the plate.
 pub struct Views<'a> {
-    light: &'a Illumination<'a>,
+    light: &'a Illumination,
     world_from_hologram: DMat4,
     hologram_from_world: DMat4,
     /// Lowest and highest z of the scene's box [m].
@@ -65,7 +65,7 @@ impl<'a> Views<'a> {
     /// # Errors
     /// As [`Placement::prepare`]; [`Error::Parameter`] for a scene that is nowhere behind the viewer's eye.
     pub fn new(
-        light: &'a Illumination<'a>,
+        light: &'a Illumination,
         scene: &Scene,
         camera: &Camera,
         plate: &Plate,
@@ -131,7 +131,7 @@ impl<'a> Views<'a> {
         self.hologram_from_world
     }
     /// The lit scene.
-    pub fn light(&self) -> &'a Illumination<'a> {
+    pub fn light(&self) -> &'a Illumination {
         self.light
     }
 
@@ -230,9 +230,8 @@ impl<'a> Views<'a> {
         let settings = self.rays(plate, [wide, tall], deepest, [segment[0], segment[1], i64::from(front)])?;
         let height = f64::from(settings.height);
         let traced = trace::trace(self.light, &camera, &settings, progress)?;
-        let mut seen: Vec<WorldPoint> =
-            traced.points.iter().map(|p| WorldPoint { position: p.position, radiance: p.radiance }).collect();
-        Exposure::White(self.white).apply(&mut seen, &[])?;
+        let mut seen = traced.world_points();
+        WhitePoint::At(self.white).apply(&mut seen, &[])?;
         // Solid angle of a pixel on the axis; off it by the cube of the cosine.
         let pixel = (2.0 * tall / height).powi(2);
         let at = DVec3::new(x, y, apex);

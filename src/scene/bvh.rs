@@ -14,6 +14,7 @@ use crate::random::Random;
 use glam::{DVec3, Vec2, Vec3A};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::{BvhBuildParams, aabb::Aabb, cwbvh::CwBvh, cwbvh::builder::build_cwbvh, ray};
+use std::sync::Arc;
 
 /// A ray in world space, double precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,8 +81,8 @@ struct Leaf {
 }
 
 /// The scene's triangles in a bounding volume hierarchy (obvhs, eight-wide compressed).
-pub struct SceneBvh<'s> {
-    scene: &'s Scene,
+pub struct SceneBvh {
+    scene: Arc<Scene>,
     tree: CwBvh,
     leaves: Vec<Leaf>,
     /// Units of traversal per metre: a power of two that makes the scene about a thousand units large, since obvhs
@@ -91,9 +92,10 @@ pub struct SceneBvh<'s> {
     offset: f64,
 }
 
-impl<'s> SceneBvh<'s> {
+impl SceneBvh {
     /// Builds the tree. Triangles without area and with corners that are not finite are left out: no ray meets them.
-    pub fn new(scene: &'s Scene) -> Self {
+    pub fn new(scene: impl Into<Arc<Scene>>) -> Self {
+        let scene = scene.into();
         let mut indices = Vec::with_capacity(scene.triangles.len());
         let mut triangles = Vec::with_capacity(scene.triangles.len());
         let mut reach = 0.0f64;
@@ -136,8 +138,8 @@ impl<'s> SceneBvh<'s> {
     }
 
     /// The scene that the tree was built from.
-    pub fn scene(&self) -> &'s Scene {
-        self.scene
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
     }
 
     /// Number of triangles that rays can meet.
@@ -351,7 +353,7 @@ mod tests {
     #[test]
     fn hits_agree_with_every_triangle_by_itself() {
         let scene = soup(700, 5);
-        let bvh = SceneBvh::new(&scene);
+        let bvh = SceneBvh::new(scene.clone());
         let mut random = Random::new(6, 0);
         let mut hits = 0;
         for _ in 0..4000 {
@@ -391,7 +393,7 @@ mod tests {
             }
         }
         let scene = Scene { triangles, ..soup(0, 0) };
-        let bvh = SceneBvh::new(&scene);
+        let bvh = SceneBvh::new(scene.clone());
         for axis in 0..3 {
             for cell in 0..144 {
                 let mut origin = DVec3::ZERO;
@@ -418,7 +420,7 @@ mod tests {
             }
         }
         let scene = Scene { triangles, ..soup(0, 0) };
-        let bvh = SceneBvh::new(&scene);
+        let bvh = SceneBvh::new(scene.clone());
         let mut random = Random::new(2, 0);
         // From the middle, and from points ever nearer to a floor and two walls that meet it.
         for near in [1.0, 1e-2, 1e-3, 1e-4, 2e-5] {
@@ -443,7 +445,7 @@ mod tests {
         let at = |z: f64| triangle([DVec3::new(-1.0, -1.0, z), DVec3::new(1.0, -1.0, z), DVec3::new(0.0, 1.0, z)], 0);
         let scene =
             Scene { triangles: vec![at(0.0)], materials: vec![Material::diffuse(Vec3::ONE)], ..Scene::default() };
-        let bvh = SceneBvh::new(&scene);
+        let bvh = SceneBvh::new(scene.clone());
         let from_behind = Ray { origin: DVec3::new(0.0, 0.0, -1.0), direction: DVec3::Z };
         assert!(bvh.nearest(&from_behind, 0.0, Sides::Front).is_none());
         assert!(bvh.nearest(&from_behind, 0.0, Sides::Both).is_some_and(|h| !h.front && h.distance == 1.0));
@@ -466,7 +468,7 @@ mod tests {
             rotation: 0.0,
             offset: Vec2::ZERO,
         });
-        let bvh = SceneBvh::new(&scene);
+        let bvh = SceneBvh::new(scene.clone());
         let down = |x: f64| Ray { origin: DVec3::new(x, 0.1, 1.0), direction: DVec3::NEG_Z };
         assert!(bvh.nearest(&down(0.3), 0.0, Sides::Front).is_some());
         assert!(bvh.nearest(&down(0.7), 0.0, Sides::Front).is_none());
@@ -482,7 +484,7 @@ mod tests {
             materials: vec![Material::diffuse(Vec3::ONE)],
             ..Scene::default()
         };
-        let bvh = SceneBvh::new(&scene);
+        let bvh = SceneBvh::new(scene.clone());
         assert_eq!(bvh.triangle_count(), 0);
         let ray = Ray { origin: DVec3::new(0.5, 0.0, 1.0), direction: DVec3::NEG_Z };
         assert!(bvh.nearest(&ray, 0.0, Sides::Both).is_none() && !bvh.occluded(DVec3::Z, DVec3::NEG_Z));
@@ -496,7 +498,7 @@ mod tests {
                 triangles: vec![triangle(corners.map(|p| (p + DVec3::new(3.0, 5.0, 1.0)) * scale), 1)],
                 ..soup(0, 0)
             };
-            let bvh = SceneBvh::new(&scene);
+            let bvh = SceneBvh::new(scene.clone());
             let t = &scene.triangles[0];
             let mut random = Random::new(1, 1);
             for _ in 0..1000 {

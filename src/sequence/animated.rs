@@ -14,8 +14,8 @@ use crate::illumination::Illumination;
 use crate::panel::PanelProfile;
 use crate::pipeline::{self, Lit, SceneSettings};
 use crate::points::Channel;
-use crate::points::exposure::{Exposure, white_level};
 use crate::points::trace::{self, TraceSettings};
+use crate::points::white::{WhitePoint, white_level};
 use crate::progress::Progress;
 use crate::scene::{Camera, Scene, SceneBvh, gltf};
 use glam::DVec3;
@@ -115,7 +115,7 @@ impl Animation {
             };
             progress.advance(1);
         }
-        self.scene.held.bounds = bounds;
+        self.scene.anchors.bounds = bounds;
         self.scene.load.framed = bounds;
         let (mut depths, mut white) = ([f64::INFINITY, f64::NEG_INFINITY], 0.0f32);
         for &time in &times {
@@ -128,10 +128,10 @@ impl Animation {
         }
         if depths[0] <= depths[1] {
             let margin = DEPTH_MARGIN * (depths[1] - depths[0]);
-            self.scene.held.depths = Some([(depths[0] - margin).max(0.5 * depths[0]), depths[1] + margin]);
+            self.scene.anchors.depths = Some([(depths[0] - margin).max(0.5 * depths[0]), depths[1] + margin]);
         }
-        if self.scene.exposure == Exposure::Auto && white > 0.0 {
-            self.scene.exposure = Exposure::White(white);
+        if self.scene.white == WhitePoint::Auto && white > 0.0 {
+            self.scene.white = WhitePoint::At(white);
         }
         Ok(())
     }
@@ -144,15 +144,16 @@ impl Animation {
     fn glance(&self, loaded: &gltf::Loaded, panel: &Grid, progress: &Progress) -> Result<([f64; 2], f32)> {
         let settings = &self.scene;
         let camera = first_camera(&self.path, &loaded.scene)?;
-        let bvh = SceneBvh::new(&loaded.scene);
+        let bvh = SceneBvh::new(loaded.scene.clone());
         let coarse = settings.illumination.coarse();
-        let light = Illumination::new(&bvh, coarse, progress)?;
+        let light = Illumination::new(bvh, coarse, progress)?;
         let (width, height) = (f64::from(settings.trace.width), f64::from(settings.trace.height));
         let scale = (LOOK_RAYS / width.max(height)).min(1.0);
         let [w, h] = [width, height].map(|side| (side * scale).round().max(1.0) as u32);
         let rays = TraceSettings { width: w, height: h, edge_rays: 1, ..settings.trace };
         // Where a miniature is seen from is the placement's matter.
-        let placing = settings.placement.prepare_for(&loaded.scene, &settings.held, camera, width / height, panel)?;
+        let placing =
+            settings.placement.prepare_for(&loaded.scene, &settings.anchors, camera, width / height, panel)?;
         let traced = trace::trace(&light, &placing.camera, &rays, progress)?;
         let camera_from_world = placing.camera.world_from_camera.inverse();
         let ends = traced
@@ -186,8 +187,8 @@ impl Animation {
                 Some(loaded) => loaded,
                 None => self.pose(&mut file, time)?,
             };
-            let bvh = SceneBvh::new(&loaded.scene);
-            let light = Illumination::new(&bvh, self.scene.illumination, progress)?;
+            let bvh = SceneBvh::new(loaded.scene.clone());
+            let light = Illumination::new(bvh, self.scene.illumination, progress)?;
             let mut camera = first_camera(&self.path, &loaded.scene)?.clone();
             let mut last: Option<Made> = None;
             // All frames for which this light holds.

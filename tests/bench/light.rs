@@ -10,6 +10,7 @@ use holodrive::random::Random;
 use holodrive::scene::{Material, Ray, Scene, SceneBvh, Sides, Triangle};
 use obvhs::{BvhBuildParams, cwbvh::CwBvh, cwbvh::builder::build_cwbvh_from_tris, ray, rt_triangle::RtTriangle};
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// A closed room of 1 m whose six faces are grids of `side`² squares, its floor wavy, with a lamp under the ceiling: as
@@ -87,7 +88,7 @@ fn library_tree(scene: &Scene) -> (CwBvh, Vec<RtTriangle>) {
 /// Primary and shadow rays: the library's tree with its own triangle test, and ours, side by side.
 fn rays(_: &mut Criterion) {
     let scene = room(153);
-    let bvh = SceneBvh::new(&scene);
+    let bvh = SceneBvh::new(scene.clone());
     let (tree, leaves) = library_tree(&scene);
     let side = 1000u32;
     let eye = DVec3::new(0.02, 0.55, 0.45);
@@ -143,7 +144,7 @@ fn growth(_: &mut Criterion) {
     let (mut before, mut worst) = (None, 0.0f64);
     for side in [9u32, 13, 18, 26, 36, 52, 73, 91] {
         let scene = room(side);
-        let bvh = SceneBvh::new(&scene);
+        let bvh = Arc::new(SceneBvh::new(scene.clone()));
         // Patches are the triangles themselves: nothing is refined, so that both double.
         let settings = IlluminationSettings {
             longest_element: 1.0,
@@ -153,7 +154,7 @@ fn growth(_: &mut Criterion) {
         };
         let (mut patches, mut imbalance) = (0, 0.0);
         let seconds = best(|| {
-            let light = Illumination::new(&bvh, settings, &Progress::new()).expect("light");
+            let light = Illumination::new(bvh.clone(), settings, &Progress::new()).expect("light");
             patches = light.report().patches;
             imbalance = light.report().energy.imbalance();
         });

@@ -5,8 +5,9 @@ use glam::{DVec3, Vec2, Vec3};
 use holodrive::scene::gltf::{Choice, LoadOptions, load};
 use holodrive::scene::{LightKind, Projection, Scene};
 use serde_json::json;
+use std::sync::Arc;
 
-fn scene(file: &Builder) -> Scene {
+fn scene(file: &Builder) -> Arc<Scene> {
     file.load().expect("loads").scene
 }
 
@@ -199,7 +200,7 @@ fn cameras_lose_scale_and_keep_their_order() {
     for choice in ["above".into(), Choice::Index(1)] {
         let options = LoadOptions { camera: Some(choice), ..LoadOptions::default() };
         let names: Vec<String> =
-            file.load_with(&options).expect("loads").scene.cameras.into_iter().map(|c| c.name).collect();
+            file.load_with(&options).expect("loads").scene.cameras.iter().map(|c| c.name.clone()).collect();
         assert_eq!(names, ["above", "wide"]);
     }
     let by_node = LoadOptions { camera: Some("front".into()), ..LoadOptions::default() };
@@ -248,7 +249,7 @@ fn punctual_lights() {
         node["scale"] = json!([3, 3, 3]);
         file.node(node);
     }
-    let lights = scene(&file).lights;
+    let lights = &scene(&file).lights;
     // Turned by −90° about +x, the node's −z points down.
     assert_eq!((lights[0].kind, lights[0].intensity), (LightKind::Directional, Vec3::new(4.0, 2.0, 0.0)));
     assert!(lights[0].direction.distance(Vec3::NEG_Y) < 1e-6);

@@ -7,6 +7,7 @@ use holodrive::scene::texture::{Wrap, linear_from_srgb};
 use holodrive::scene::{AlphaMode, Material, Scene, TextureRef};
 use serde_json::json;
 use std::io::Cursor;
+use std::sync::Arc;
 
 fn encoded(texels: &[[u8; 4]], width: u32, format: image::ImageFormat) -> Vec<u8> {
     let picture = image::RgbaImage::from_raw(width, texels.len() as u32 / width, texels.concat()).expect("picture");
@@ -28,7 +29,7 @@ fn textured() -> Builder {
     file
 }
 
-fn scene(file: &Builder) -> Scene {
+fn scene(file: &Builder) -> Arc<Scene> {
     file.load().expect("loads").scene
 }
 

@@ -4,8 +4,9 @@ use glam::{DVec3, Vec3};
 use holodrive::scene::gltf::{LoadOptions, load};
 use holodrive::scene::{Scene, Triangle};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-fn own(name: &str) -> Scene {
+fn own(name: &str) -> Arc<Scene> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
     let loaded = load(&path, &LoadOptions::default()).expect("a scene of our own loads");
     assert_eq!(loaded.warnings, [], "{name}");

@@ -45,6 +45,7 @@ use document::Document;
 use glam::DVec3;
 use meshes::UsedMaterials;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// One of several things in a file, by its name or its number from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -97,7 +98,7 @@ pub struct LoadOptions {
 #[derive(Clone, Debug)]
 pub struct Loaded {
     /// The scene; it has at least one triangle, one camera and some light.
-    pub scene: Scene,
+    pub scene: Arc<Scene>,
     /// Assumptions and omissions, in the order in which they were made.
     pub warnings: Vec<Warning>,
 }
@@ -179,7 +180,7 @@ impl File {
         let (used, wanted) = (&decoded.used, options.viewer_light);
         lights::ensure_light(document, &mut scene, used, (wanted, options.framed), &mut warnings)?;
         self.decoded = Some(decoded);
-        Ok(Loaded { scene, warnings })
+        Ok(Loaded { scene: Arc::new(scene), warnings })
     }
 
     /// First and last key time of a clip [s]; `None` where the file has no animation, or the rest pose is asked for.

@@ -11,21 +11,21 @@ use super::{Channel, luminance};
 use crate::error::{Error, Result};
 use serde::Serialize;
 
-/// How light is exposed.
+/// What is done with light that is brighter than a picture's white.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Exposure {
+pub enum WhitePoint {
     /// Radiance is kept as it is.
     #[default]
-    Full,
+    Unlimited,
     /// Brightness is clipped at [`white_level`] of the picture, colour kept.
     Auto,
     /// Brightness is clipped at this value [W/(m² sr)].
-    White(f32),
+    At(f32),
 }
 
-/// What an exposure did.
+/// Where white lies, and what of the light is brighter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Exposed {
+pub struct WhiteLevel {
     /// What pictures show as white [W/(m² sr)].
     pub white: f32,
     /// Whether light beyond it was clipped in the points, too.
@@ -40,7 +40,7 @@ pub struct Exposed {
     pub light_above: f64,
 }
 
-impl Exposed {
+impl WhiteLevel {
     /// Share of the light that was clipped, 0 to 1.
     pub fn clipped_light(&self) -> f64 {
         if self.clips { self.light_above } else { 0.0 }
@@ -51,36 +51,36 @@ impl Exposed {
     }
 }
 
-impl Exposure {
-    /// Exposes points that were traced with `picture` (linear RGB radiance); says what is above white even where nothing is
+impl WhitePoint {
+    /// Clips points that were traced with `picture` (linear RGB radiance); says what is above white even where nothing is
     /// clipped.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a white that is not greater than zero.
-    pub fn apply(self, points: &mut [WorldPoint], picture: &[[f32; 3]]) -> Result<Exposed> {
+    pub fn apply(self, points: &mut [WorldPoint], picture: &[[f32; 3]]) -> Result<WhiteLevel> {
         let white = match self {
-            Self::Full | Self::Auto => white_level(picture),
-            Self::White(white) if white.is_finite() && white > 0.0 => white,
-            Self::White(white) => return Err(Error::parameter("white", format!("{white} must be greater than zero"))),
+            Self::Unlimited | Self::Auto => white_level(picture),
+            Self::At(white) if white.is_finite() && white > 0.0 => white,
+            Self::At(white) => return Err(Error::parameter("white", format!("{white} must be greater than zero"))),
         };
-        let mut exposed = Exposed { white, clips: self != Self::Full, ..Exposed::default() };
+        let mut level = WhiteLevel { white, clips: self != Self::Unlimited, ..WhiteLevel::default() };
         let (mut all, mut above) = (0.0, 0.0);
         for point in points.iter_mut() {
             let (brightness, light) = (brightness(point.radiance), f64::from(luminance(point.radiance)));
             all += light;
-            exposed.brightest = exposed.brightest.max(brightness);
+            level.brightest = level.brightest.max(brightness);
             if brightness > white {
                 let kept = white / brightness;
                 above += light * f64::from(1.0 - kept);
-                exposed.brighter_points += 1;
-                if exposed.clips {
+                level.brighter_points += 1;
+                if level.clips {
                     point.radiance = point.radiance.map(|c| c * kept);
                 }
             }
         }
-        exposed.brighter_share = exposed.brighter_points as f64 / points.len().max(1) as f64;
-        exposed.light_above = if all > 0.0 { above / all } else { 0.0 };
-        Ok(exposed)
+        level.brighter_share = level.brighter_points as f64 / points.len().max(1) as f64;
+        level.light_above = if all > 0.0 { above / all } else { 0.0 };
+        Ok(level)
     }
 }
 
@@ -112,19 +112,19 @@ mod tests {
         let mut picture = vec![[0.5; 3]; 99];
         picture.push([20.0, 10.0, 5.0]);
         let mut seen = points(&picture);
-        let exposed = Exposure::Auto.apply(&mut seen, &picture).expect("exposed");
-        assert!((exposed.white - 0.625).abs() < 1e-6 && exposed.brightest == 20.0);
-        assert_eq!((exposed.clipped_points(), exposed.brighter_share), (1, 0.01));
+        let level = WhitePoint::Auto.apply(&mut seen, &picture).expect("white");
+        assert!((level.white - 0.625).abs() < 1e-6 && level.brightest == 20.0);
+        assert_eq!((level.clipped_points(), level.brighter_share), (1, 0.01));
         // Its hue stays: 20 : 10 : 5, brightness at white.
         let lamp = seen[99].radiance;
         assert!((lamp[0] - 0.625).abs() < 1e-6 && lamp[0] / lamp[1] == 2.0 && lamp[1] / lamp[2] == 2.0);
         let before = f64::from(luminance([20.0, 10.0, 5.0]));
         let lost = before - f64::from(luminance(lamp));
-        assert!((exposed.clipped_light() - lost / (99.0 * 0.5 + before)).abs() < 1e-6, "{exposed:?}");
+        assert!((level.clipped_light() - lost / (99.0 * 0.5 + before)).abs() < 1e-6, "{level:?}");
         let mut seen = points(&picture);
-        let full = Exposure::Full.apply(&mut seen, &picture).expect("exposed");
+        let full = WhitePoint::Unlimited.apply(&mut seen, &picture).expect("white");
         assert!(seen == points(&picture) && full.clipped_points() == 0 && full.clipped_light() == 0.0);
-        assert!(full.brighter_points == 1 && full.light_above == exposed.light_above && full.white == exposed.white);
+        assert!(full.brighter_points == 1 && full.light_above == level.light_above && full.white == level.white);
     }
 
     #[test]
@@ -134,10 +134,10 @@ mod tests {
         assert!((white_level(&picture) - 1.0).abs() < 1e-6);
         assert_eq!(white_level(&[[0.0; 3]]), 1.0);
         let mut seen = points(&picture);
-        let exposed = Exposure::White(0.4).apply(&mut seen, &picture).expect("exposed");
-        assert!(exposed.clipped_points() == 50 && (exposed.clipped_light() - 0.5).abs() < 1e-6);
+        let level = WhitePoint::At(0.4).apply(&mut seen, &picture).expect("white");
+        assert!(level.clipped_points() == 50 && (level.clipped_light() - 0.5).abs() < 1e-6);
         for wrong in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-            assert!(Exposure::White(wrong).apply(&mut seen, &picture).is_err(), "{wrong}");
+            assert!(WhitePoint::At(wrong).apply(&mut seen, &picture).is_err(), "{wrong}");
         }
     }
 }
