@@ -38,26 +38,27 @@
 //! A room uses only rooms that stand above it in this list; `tests/layering.rs` reads the list and keeps it so.
 //!
 //! 1. [`error`]: one error type, variants sorted by who can act
-//! 2. [`progress`]: how long work tells that it moves on, and is told to stop
-//! 3. [`units`]: lengths and angles with units
-//! 4. [`files`]: files that appear whole or not at all
-//! 5. [`random`]: random numbers by seed and index
-//! 6. [`field`]: complex samples on a grid; index ↔ metre ↔ cycles/m; Fourier transforms; `.npy`
-//! 7. [`scene`]: glTF, triangles, materials, textures, lights, cameras, ray casting
-//! 8. [`illumination`]: light arriving on surfaces: form factors, radiosity, direct light
-//! 9. [`points`]: rays to point sources; how many, how bright, for which lasers; placement before the panel; PLY
-//! 10. [`propagation`]: plane to plane
-//! 11. [`hologram`]: points to the field on the panel: oracle, engines, planner
-//! 12. [`panel`]: profiles, frames of drive levels, packing, the simulated panel
-//! 13. [`encode`]: field to phase or fringes for a panel's levels and range
-//! 14. [`reconstruction`]: field to pictures, gray or in three lasers' colours, and how good they are
-//! 15. [`pipeline`]: the whole way, on one screen
-//! 16. [`sequence`]: frames in time: prepared pictures, raw video and arrays; an animated scene, frame by frame
-//! 17. [`live`]: a hologram that follows its scene's file and the operator's keys, coarse at once and refined
-//! 18. [`comparison`]: all encodings side by side, with figures
-//! 19. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
-//! 20. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols, a local one for Python; the panel kept for them
-//! 21. [`display`]: monitors and the fullscreen window (feature `display`)
+//! 2. [`names`]: closed sets whose values have names
+//! 3. [`progress`]: how long work tells that it moves on, and is told to stop
+//! 4. [`units`]: lengths and angles with units
+//! 5. [`files`]: files that appear whole or not at all
+//! 6. [`random`]: random numbers by seed and index
+//! 7. [`field`]: complex samples on a grid; index ↔ metre ↔ cycles/m; Fourier transforms; `.npy`
+//! 8. [`scene`]: glTF, triangles, materials, textures, lights, cameras, ray casting
+//! 9. [`illumination`]: light arriving on surfaces: form factors, radiosity, direct light
+//! 10. [`points`]: rays to point sources; how many, how bright, for which lasers; placement before the panel; PLY
+//! 11. [`propagation`]: plane to plane
+//! 12. [`hologram`]: points to the field on the panel: oracle, engines, planner
+//! 13. [`panel`]: profiles, frames of drive levels, packing, the simulated panel
+//! 14. [`encode`]: field to phase or fringes for a panel's levels and range
+//! 15. [`reconstruction`]: field to pictures, gray or in three lasers' colours, and how good they are
+//! 16. [`pipeline`]: the whole way, on one screen
+//! 17. [`sequence`]: frames in time: prepared pictures, raw video and arrays; an animated scene, frame by frame
+//! 18. [`live`]: a hologram that follows its scene's file and the operator's keys, coarse at once and refined
+//! 19. [`comparison`]: all encodings side by side, with figures
+//! 20. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
+//! 21. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols, a local one for Python; the panel kept for them
+//! 22. [`display`]: monitors and the fullscreen window (feature `display`)
 
 pub mod comparison;
 #[cfg(feature = "display")]
@@ -69,6 +70,7 @@ pub mod files;
 pub mod hologram;
 pub mod illumination;
 pub mod live;
+pub mod names;
 pub mod panel;
 pub mod pipeline;
 pub mod points;

@@ -296,7 +296,7 @@ fn a_reference_that_aliases_is_refused_with_numbers() {
         let made = holodrive(f, &["compute", "p.ply", "--panel", panel, "-o", "field.npy"]);
         assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
         let encode =
-            ["encode", "field.npy", "--panel", panel, "--method", "off-axis-bipolar", "--reference-angle", "85deg"];
+            ["encode", "field.npy", "--panel", panel, "--encoding", "off-axis-bipolar", "--reference-angle", "85deg"];
         refused(f, &encode, "limit");
     }
 }

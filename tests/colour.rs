@@ -3,6 +3,7 @@
 use glam::DVec3;
 use holodrive::encode::{EncodeSettings, Encoding};
 use holodrive::hologram::HologramSettings;
+use holodrive::names::Named;
 use holodrive::panel::PanelProfile;
 use holodrive::panel::simulated::Simulation;
 use holodrive::pipeline::{self, SceneSettings};

@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 use holodrive::encode::{EncodeSettings, Encoding, encode};
 use holodrive::field::{Complex32, Complex64, Field, npy};
 use holodrive::hologram::HologramSettings;
+use holodrive::names::Named;
 use holodrive::panel::calibration::zernike;
 use holodrive::panel::{Curve, Faults, Frame, PanelProfile, Response, Simulation, Wavefront, simulate, wavefront};
 use holodrive::pipeline;
@@ -248,7 +249,7 @@ fn two_waves_of_bend_are_found_from_interferograms_and_from_coefficients() {
     npy::write_field(&f.join("flat-field.npy"), &flat, &npy::Content::default(), "test").expect("write");
     for panel in ["flat.toml", "known.toml"] {
         let report =
-            done(f, &["encode", "flat-field.npy", "--panel", panel, "--method", "kinoform", "-o", "frame.png"]);
+            done(f, &["encode", "flat-field.npy", "--panel", panel, "--encoding", "kinoform", "-o", "frame.png"]);
         assert!(report["correction"].is_string(), "{report}");
         let (frame, _) = Frame::read(&f.join("frame.png"), None, None).expect("frame");
         assert!(frame.metadata.applied.correction.is_some());
@@ -266,7 +267,7 @@ fn two_waves_of_bend_are_found_from_interferograms_and_from_coefficients() {
             "flat-field.npy",
             "--panel",
             "flat.toml",
-            "--method",
+            "--encoding",
             "kinoform",
             "--correction",
             "none",
@@ -420,7 +421,7 @@ fn pictures_at_depths_blazes_lenses_and_views() {
                 "rgb.png+depth.png",
                 "--panel",
                 "panel.toml",
-                "--method",
+                "--encoding",
                 method,
                 "--depths",
                 "5mm,6mm,7mm",
@@ -460,8 +461,8 @@ fn pictures_at_depths_blazes_lenses_and_views() {
     assert!(aside["zero"].as_f64().expect("share") > 1e-3);
     orders(&["--blaze", "1deg,1deg", "--lens", "300mm"]);
     orders(&["--band-stop", "0.1deg"]);
-    orders(&["--method", "gradient", "--iterations", "20", "--blaze", "1deg,1deg"]);
-    orders(&["--method", "error-diffusion", "--lens", "300mm"]);
+    orders(&["--encoding", "gradient", "--iterations", "20", "--blaze", "1deg,1deg"]);
+    orders(&["--encoding", "error-diffusion", "--lens", "300mm"]);
     // Where the object stands is where it was meant to, whatever the placement: the brightest cell of the picture.
     let brightest = |flags: &[&str]| {
         orders(flags);
@@ -509,7 +510,7 @@ fn pictures_at_depths_blazes_lenses_and_views() {
                 "rgb.png",
                 "--panel",
                 "panel.toml",
-                "--method",
+                "--encoding",
                 "double-phase",
                 "--depths",
                 "5mm",
@@ -530,7 +531,7 @@ fn pictures_at_depths_blazes_lenses_and_views() {
         (&["encode", "field.npy", "--panel", "panel.toml", "--lens", "1mm", "-o", "x.png"], "limit"),
         (&["encode", "field.npy", "--panel", "panel.toml", "--correction", "none.npy", "-o", "x.png"], "none.npy"),
         (
-            &["encode", "field.npy", "--panel", "panel.toml", "--method", "lee", "--blaze", "1deg", "-o", "x.png"],
+            &["encode", "field.npy", "--panel", "panel.toml", "--encoding", "lee", "--blaze", "1deg", "-o", "x.png"],
             "reference",
         ),
         (

@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 use holodrive::encode::{EncodeSettings, Encoding, OffAxis, Reference};
 use holodrive::field::{Complex64, Fft2, Field, Grid, npy};
 use holodrive::hologram::{self, HologramSettings};
+use holodrive::names::Named;
 use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Frame, Illumination, PanelProfile};
 use holodrive::pipeline;

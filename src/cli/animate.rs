@@ -3,7 +3,7 @@
 use super::args::{ShowArgs, White};
 use super::bar::Bar;
 use super::encoding::encode_settings;
-use super::load::{self, Panel, channel, hologram_settings, luminance_picture, scene_settings};
+use super::load::{self, Panel, hologram_settings, luminance_picture, scene_settings};
 use super::report::{Report, count, seconds};
 use super::sequence::{CELL, SHEET, frame_path};
 use super::show::finish;
@@ -68,7 +68,7 @@ struct Maker {
 
 impl Maker {
     fn make(&self, args: &ShowArgs, progress: &Progress, take: &mut dyn FnMut(Made) -> Result<bool>) -> Result<()> {
-        let at = (&self.panel.profile, self.panel.wavelength, channel(&args.hologram));
+        let at = (&self.panel.profile, self.panel.wavelength, args.hologram.channel);
         self.animation.make(at, &self.hologram, &self.encode, progress, take)
     }
 }
@@ -86,7 +86,7 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
         Placement::Model { z, .. } => Some([z, z]),
     };
     let encode = encode_settings(&args.encoding, &panel, content, &mut report)?;
-    let hologram = hologram_settings(&args.hologram, args.engine);
+    let hologram = hologram_settings(&args.hologram);
     files::output_folder(&args.output.join("frames"))?;
     let bar = Bar::new();
     let mut maker = Maker { animation, panel, hologram, encode };
@@ -194,8 +194,8 @@ fn play(
     progress: &std::sync::Arc<Progress>,
     report: &mut Report,
 ) -> Result<()> {
+    use super::args::Ahead;
     use super::sequence::state_memory;
-    use super::sequence_args::Ahead;
     use holodrive::Error;
     use holodrive::display::{DisplayFrame, PlaySettings};
     use std::sync::mpsc::sync_channel;

@@ -1,63 +1,16 @@
 //! `bench`: what there is, side by side.
 
-use super::args::StartArg;
+use super::args::{BenchCommand, EncodingsArgs, IterationsArgs};
 use super::bar::Bar;
 use super::report::{Report, seconds};
-use clap::{Args, Subcommand};
 use holodrive::comparison::{Effort, compare, encodings, flat_picture, markdown, panels, scene_picture};
 use holodrive::encode::iterative::{GradientDescent, Start, Target, TargetPlane, gradient_descent};
 use holodrive::field::{Complex32, Fft2};
+use holodrive::names::Named;
 use holodrive::panel::PanelProfile;
 use holodrive::{Error, Result, files};
 use std::path::PathBuf;
 use std::time::Instant;
-
-#[derive(Debug, Subcommand)]
-pub(crate) enum BenchCommand {
-    /// All encodings on a flat picture and on scenes, on three simulated panels: a table in Markdown.
-    #[command(
-        after_help = "Examples:\n  holodrive bench encodings --scene scenes/cornell.gltf --scene scenes/depth-chart.gltf -o table.md\n  holodrive bench encodings --size 96x72 --iterations 20 --only double-phase --only weighted --json"
-    )]
-    Encodings(EncodingsArgs),
-    /// Iterations per second of the gradient descent beside the time of a pair of Fourier transforms.
-    #[command(after_help = "Example:\n  holodrive bench iterations --size 1920x1080 --planes 3")]
-    Iterations(IterationsArgs),
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct EncodingsArgs {
-    /// Pixels of the panel (of 8 µm).
-    #[arg(long, default_value = "256x192", value_parser = super::args::size, value_name = "WxH")]
-    size: (usize, usize),
-    /// Iterations of the methods that iterate.
-    #[arg(long, default_value_t = 200, value_name = "N")]
-    iterations: usize,
-    /// First phases of the methods with depths.
-    #[arg(long, value_enum, default_value_t = StartArg::Random, value_name = "PHASES")]
-    start: StartArg,
-    /// A scene (.gltf, .glb) beside the flat picture; may be given again.
-    #[arg(long, value_name = "FILE")]
-    scene: Vec<PathBuf>,
-    /// Only this encoding; may be given again.
-    #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(holodrive::encode::Encoding::NAMES), value_name = "NAME")]
-    only: Vec<String>,
-    /// Also write the table to this file.
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct IterationsArgs {
-    /// Pixels of the panel.
-    #[arg(long, default_value = "1920x1080", value_parser = super::args::size, value_name = "WxH")]
-    size: (usize, usize),
-    /// Number of depth planes.
-    #[arg(long, default_value_t = 1, value_name = "N")]
-    planes: usize,
-    /// Iterations that are timed.
-    #[arg(long, default_value_t = 8, value_name = "N")]
-    iterations: usize,
-}
 
 pub(super) fn bench(command: &BenchCommand) -> Result<Report> {
     match command {
@@ -88,11 +41,11 @@ fn table(args: &EncodingsArgs) -> Result<Report> {
     for (name, picture) in &pictures {
         for panel in &panels {
             for encoding in encodings() {
-                if !args.only.is_empty() && !args.only.iter().any(|only| only == encoding) {
+                if !args.only.is_empty() && !args.only.iter().any(|only| only.name() == encoding) {
                     continue;
                 }
                 bar.progress.check()?;
-                let effort = Effort { iterations: args.iterations, start: super::encoding::start(args.start) };
+                let effort = Effort { iterations: args.iterations, start: args.start };
                 rows.push(compare((name, picture), panel, encoding, effort, &bar.progress)?);
             }
         }

@@ -1,10 +1,9 @@
 //! `calibrate`: frames to show, and what the measured numbers say of the panel.
 
-use super::args::PanelArgs;
+use super::args::{CalibrateCommand, CheckArgs, CurveArgs, FlatnessArgs, PanelArgs, ShownArgs};
 use super::bar::Bar;
 use super::load::{Panel, panel, panel_correction};
 use super::report::{Report, seconds};
-use clap::{Args, Subcommand, ValueEnum};
 use holodrive::field::npy;
 use holodrive::panel::calibration::curve::Order;
 use holodrive::panel::calibration::{
@@ -18,114 +17,6 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-
-/// What is calibrated.
-#[derive(Debug, Subcommand)]
-pub(crate) enum CalibrateCommand {
-    /// The level → phase curve: without --powers the gratings to show, with it the curve that the powers tell.
-    #[command(
-        after_help = "Examples:\n  holodrive calibrate curve --panel holoeye-pluto-2.1 --wavelength 532nm -o sweep\n  holodrive calibrate curve --panel holoeye-pluto-2.1 --wavelength 532nm --monitor HDMI-1 --hold 0.5 -o sweep\n  holodrive calibrate curve --panel holoeye-pluto-2.1 --wavelength 532nm --powers sweep/manifest.csv -o mine.toml\n\nThe sweep's folder holds the gratings and manifest.csv, a line for each, whose column `power` is for the power in the first order (or the zero order, --order zero). Powers may also come from any CSV with the columns level,power or level,column,row,power."
-    )]
-    Curve(CurveArgs),
-    /// The bend: without --interferograms or --zernike the phase steps to show, with one of them the correction.
-    #[command(
-        after_help = "Examples:\n  holodrive calibrate flatness --panel mine.toml --steps 4 -o steps\n  holodrive calibrate flatness --panel mine.toml --interferograms i0.png,i1.png,i2.png,i3.png -o flat.npy --into mine.toml\n  holodrive calibrate flatness --panel mine.toml --zernike 0,0,0,0.8,-0.1 --radius 6mm -o flat.png"
-    )]
-    Flatness(FlatnessArgs),
-    /// Test cards whose errors an eye sees.
-    #[command(
-        after_help = "Examples:\n  holodrive calibrate check --panel mine.toml -o cards\n  holodrive calibrate check --panel mine.toml --monitor HDMI-1 --hold 10 -o cards"
-    )]
-    Check(CheckArgs),
-}
-
-/// Where frames are shown beside being written.
-#[derive(Clone, Debug, Args)]
-pub(crate) struct ShownArgs {
-    /// Also show the frames one after another on this monitor (see `holodrive monitors`).
-    #[arg(long, value_name = "NAME")]
-    monitor: Option<String>,
-    /// How long each frame is shown, in seconds; not less than the panel takes to settle.
-    #[arg(long, default_value_t = 0.5, value_name = "SECONDS")]
-    hold: f64,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum OrderArg {
-    /// The detector saw a first order of the gratings.
-    First,
-    /// The detector saw the undiffracted light.
-    Zero,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct CurveArgs {
-    #[command(flatten)]
-    panel: PanelArgs,
-    /// Measured powers (.csv): find the curve.
-    #[arg(long, value_name = "FILE")]
-    powers: Option<PathBuf>,
-    /// Folder for the gratings [default: sweep], or the profile to write [default: calibrated.toml].
-    #[arg(short, long, value_name = "PATH")]
-    output: Option<PathBuf>,
-    /// Order of the gratings that was measured.
-    #[arg(long, value_enum, default_value_t = OrderArg::First)]
-    order: OrderArg,
-    /// Number of levels in the sweep, evenly from the lowest to the highest [default: 64, or all of fewer].
-    #[arg(long, value_name = "N", conflicts_with = "powers")]
-    levels: Option<usize>,
-    /// Width of the gratings' stripes, in columns: several, against crosstalk.
-    #[arg(long, default_value_t = 8, value_name = "COLUMNS")]
-    stripe: usize,
-    /// Sweep this many regions of the panel one after another, side by side × one above the other.
-    #[arg(long, value_parser = super::args::size, value_name = "CxR", conflicts_with = "powers")]
-    regions: Option<(usize, usize)>,
-    /// Degree of the polynomial [default: the one that explains the powers best].
-    #[arg(long, value_name = "N")]
-    degree: Option<usize>,
-    #[command(flatten)]
-    shown: ShownArgs,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct FlatnessArgs {
-    #[command(flatten)]
-    panel: PanelArgs,
-    /// Pictures of the panel's pixels in interference with a flat wave, one for each step, in their order: .png, .npy.
-    #[arg(long, value_name = "FILE,…", value_delimiter = ',', conflicts_with = "zernike")]
-    interferograms: Vec<PathBuf>,
-    /// Zernike coefficients of the panel's bend in waves, from piston on, in Noll's order and normalisation.
-    #[arg(long, value_name = "WAVES,…", value_delimiter = ',', allow_hyphen_values = true, requires = "radius")]
-    zernike: Vec<f64>,
-    /// Radius of the circle that the coefficients are for.
-    #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
-    radius: Option<f64>,
-    /// Number of phase steps to show.
-    #[arg(long, default_value_t = 4, value_name = "N")]
-    steps: usize,
-    /// Folder for the steps [default: steps], or the correction to write, .npy or .png [default: flatness.npy].
-    #[arg(short, long, value_name = "PATH")]
-    output: Option<PathBuf>,
-    /// Also write the panel's profile with this correction to this file.
-    #[arg(long, value_name = "FILE")]
-    into: Option<PathBuf>,
-    #[command(flatten)]
-    shown: ShownArgs,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct CheckArgs {
-    #[command(flatten)]
-    panel: PanelArgs,
-    /// Folder for the cards.
-    #[arg(short, long, default_value = "cards", value_name = "DIR")]
-    output: PathBuf,
-    /// Where the spots and letters are seen, in front of the panel.
-    #[arg(long, default_value = "200mm", value_parser = units::positive_length, value_name = "LENGTH")]
-    distance: f64,
-    #[command(flatten)]
-    shown: ShownArgs,
-}
 
 pub(super) fn calibrate(command: &CalibrateCommand) -> Result<Report> {
     match command {
@@ -234,7 +125,7 @@ fn sweep(args: &CurveArgs) -> Result<Report> {
     if parts.is_some_and(|(columns, rows)| columns * rows * count > 100_000) {
         return Err(Error::parameter("regions", format!("{parts:?} with {count} levels each are too many frames")));
     }
-    if parts.is_some() && args.order == OrderArg::Zero {
+    if parts.is_some() && args.order == Order::Zero {
         let what = "regions are told apart in the first order only; leave --order zero out";
         return Err(Error::parameter("order", what));
     }
@@ -279,10 +170,7 @@ fn solve(args: &CurveArgs, powers: &Path) -> Result<Report> {
     let begin = Instant::now();
     let (profile, wavelength) = (&panel.profile, panel.wavelength);
     let measured = read_powers(powers, profile.levels())?;
-    let order = match args.order {
-        OrderArg::First => Order::First,
-        OrderArg::Zero => Order::Zero,
-    };
+    let order = args.order;
     let found = fit(&measured, profile.levels(), order, args.degree, powers)?;
     let worst = found.uncertainty.iter().fold(0.0, |a: f64, &b| a.max(b));
     let mean = (found.uncertainty.iter().map(|u| u * u).sum::<f64>() / found.uncertainty.len() as f64).sqrt();

@@ -55,7 +55,7 @@ pub(super) fn compute(
     progress: &Progress,
     report: &mut Report,
 ) -> Result<()> {
-    let settings = hologram_settings(&args.hologram, args.engine);
+    let settings = hologram_settings(&args.hologram);
     let fields = fields(points, lasers, panel, &settings, progress, report)?;
     for (i, computed) in fields.computed.iter().enumerate() {
         let mut part = Report::new("compute");
@@ -108,7 +108,7 @@ pub(super) fn frames(
     progress: &Progress,
     report: &mut Report,
 ) -> Result<Colors> {
-    let settings = hologram_settings(&args.hologram, args.engine);
+    let settings = hologram_settings(&args.hologram);
     let fields = fields(points, lasers, panel, &settings, progress, report)?;
     let content = content(&points.cloud, &points.metadata);
     let mut frames = [None, None, None];

@@ -1,20 +1,21 @@
 //! The steps, one by one.
 
-use super::args::{ComputeArgs, FrameArg, KernelArg, PointsArgs, PropagateArgs, ReconstructArgs, White};
+use super::args::{ComputeArgs, PointsArgs, PropagateArgs, ReconstructArgs, White};
 use super::bar::Bar;
 use super::colour;
 use super::layers;
 use super::light::report_gamut;
-use super::load::{Input, channel, depth_scale, hologram_settings, input, load_points, panel_in_color, placed_by};
+use super::load::{Input, hologram_settings, input, load_points, panel_in_color, placed_by};
 use super::report::{Report, seconds};
 use glam::DVec2;
 use holodrive::field::npy;
 use holodrive::hologram::Computed;
+use holodrive::names::Named;
 use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Faults, Frame, PanelProfile, wavefront};
 use holodrive::pipeline::{self, Lit};
 use holodrive::points::{Placement, PointCloud, images, ply};
-use holodrive::propagation::{self, Kernel, Propagator};
+use holodrive::propagation::{self, Propagator};
 use holodrive::reconstruction::{self, Picture, Scale, View, ViewSettings, orders, write_rgb_png};
 use holodrive::units::{self, show_length};
 use holodrive::{Error, Result};
@@ -40,7 +41,7 @@ pub(super) fn points(args: &PointsArgs) -> Result<Report> {
     }
     let (mut cloud, mut metadata) = (points.cloud, points.metadata);
     let Some(lit) = points.lit else { return Err(Error::input(&args.scene, "is no scene")) };
-    if args.frame == FrameArg::World {
+    if args.frame == ply::Frame::World {
         metadata = ply::Metadata { frame: ply::Frame::World, eye: None, window: None, ..metadata };
         for (point, world) in cloud.points.iter_mut().zip(&lit.world) {
             point.position = world.position;
@@ -59,7 +60,7 @@ pub(super) fn points(args: &PointsArgs) -> Result<Report> {
             ));
         };
         let size = [lit.view.width as u32, lit.view.height as u32];
-        images::write_depths(map, size, &lit.view.depths, depth_scale(args.placement.depth_scale), [near, far])?;
+        images::write_depths(map, size, &lit.view.depths, args.placement.depth_scale, [near, far])?;
         report.add("depth_map", map.display().to_string(), format!("depth map    {}", map.display()));
     }
     ply::write(&args.output, &cloud, &metadata)?;
@@ -119,9 +120,9 @@ pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
         colour::compute(args, (&panel, lasers), &points, &bar.progress, &mut report)?;
         return Ok(report);
     }
-    let settings = hologram_settings(&args.hologram, args.engine);
-    let channel = channel(&args.hologram);
-    let computed = pipeline::field(&points.cloud, channel, &panel.grid, panel.wavelength, &settings, &bar.progress)?;
+    let settings = hologram_settings(&args.hologram);
+    let computed =
+        pipeline::field(&points.cloud, args.hologram.channel, &panel.grid, panel.wavelength, &settings, &bar.progress)?;
     report_field(&computed, &mut report);
     bar.progress.check()?;
     let content = content(&points.cloud, &points.metadata);
@@ -153,11 +154,7 @@ pub(super) fn propagate(args: &PropagateArgs) -> Result<Report> {
     let bar = Bar::new();
     let begin = Instant::now();
     bar.progress.start("propagate", 0);
-    let kernel = match args.kernel {
-        KernelArg::AngularSpectrum => Kernel::AngularSpectrum,
-        KernelArg::Fresnel => Kernel::Fresnel,
-    };
-    let settings = propagation::Settings { kernel, ..propagation::Settings::default() };
+    let settings = propagation::Settings { kernel: args.kernel, ..propagation::Settings::default() };
     let planned = Propagator::new(field.grid, field.grid, settings)?;
     let out = planned.propagate(&field, args.distance, &bar.progress)?;
     let content = npy::Content { z: metadata.content.z + args.distance, ..metadata.content };

@@ -4,7 +4,9 @@ use super::args::ShowArgs;
 use super::load::Panel;
 use glam::DVec3;
 use holodrive::display::{Key, KeyPress};
+use holodrive::encode::Encoding;
 use holodrive::live::Look;
+use holodrive::names::Named;
 use holodrive::panel::Modulation;
 
 /// Lasers that are offered beside the profile's own, where the panel has a curve for them [m].
@@ -122,7 +124,7 @@ impl Controls {
 /// What the keys choose from.
 pub(super) struct Choices {
     pub(super) wavelengths: Vec<f64>,
-    pub(super) encodings: Vec<String>,
+    pub(super) encodings: Vec<Encoding>,
 }
 
 impl Choices {
@@ -139,9 +141,10 @@ impl Choices {
             Modulation::Phase => &PHASE,
             Modulation::Amplitude => &AMPLITUDE,
         };
-        let mut encodings: Vec<String> = args.encoding.encoding.iter().cloned().collect();
-        encodings
-            .extend(usual.iter().map(ToString::to_string).filter(|name| Some(name) != args.encoding.encoding.as_ref()));
+        let mut encodings: Vec<Encoding> = args.encoding.encoding.iter().cloned().collect();
+        let typed = encodings.first().map(Encoding::name);
+        let others = usual.iter().filter(|name| Some(**name) != typed);
+        encodings.extend(others.filter_map(|name| Encoding::named(name).ok()));
         Self { wavelengths, encodings }
     }
 }
@@ -151,7 +154,7 @@ mod tests {
     use super::*;
 
     fn choices() -> Choices {
-        Choices { wavelengths: vec![633e-9, 520e-9], encodings: vec!["a".into(), "b".into(), "c".into()] }
+        Choices { wavelengths: vec![633e-9, 520e-9], encodings: vec![Encoding::Kinoform; 3] }
     }
 
     #[test]

@@ -1,15 +1,17 @@
 //! Fields and pictures as frames: the flags of the encodings, resolved.
 
-use super::args::{EncodeArgs, EncodingArgs, StartArg};
+use super::args::{EncodeArgs, EncodingArgs};
 use super::bar::Bar;
 use super::commands::depth;
 use super::load::{Input, Panel, input, panel, panel_correction};
 use super::report::{Report, seconds};
 use holodrive::encode::pictures::{DepthPicture, encode_planes};
 use holodrive::encode::{
-    EncodeReport, EncodeSettings, Encoding, PlaneEncoding, PlaneMethod, PlaneStart, Reference, blaze_and_lens,
+    DoublePhase, EncodeReport, EncodeSettings, Encoding, OffAxis, PlaneEncoding, PlaneMethod, PlaneStart, Reference,
+    blaze_and_lens,
 };
 use holodrive::field::{Field, npy};
+use holodrive::names::Named;
 use holodrive::panel::{Frame, Modulation, Origin};
 use holodrive::pipeline;
 use holodrive::progress::Progress;
@@ -26,11 +28,11 @@ pub(super) fn encode_settings(
     content: Option<[f64; 2]>,
     report: &mut Report,
 ) -> Result<EncodeSettings> {
-    let chosen = args.encoding.as_deref().unwrap_or(match panel.profile.modulation() {
-        Modulation::Amplitude => "off-axis-bipolar",
-        Modulation::Phase => "double-phase",
+    let mut encoding = args.encoding.clone().unwrap_or_else(|| match panel.profile.modulation() {
+        Modulation::Amplitude => Encoding::OffAxisBipolar(OffAxis::default()),
+        Modulation::Phase => Encoding::DoublePhase(DoublePhase::default()),
     });
-    let mut encoding = Encoding::named(chosen)?;
+    let chosen = encoding.name();
     if let Some(angles) = args.reference_angle {
         match &mut encoding {
             Encoding::OffAxisBipolar(fringe) | Encoding::OffAxisIntensity(fringe) => {
@@ -49,7 +51,7 @@ pub(super) fn encode_settings(
         Encoding::Planes(planes) => {
             planes.iterations = iterations.unwrap_or(planes.iterations);
             planes.depths = depths(args, content)?;
-            planes.start = args.start.map_or(planes.start, start);
+            planes.start = args.start.unwrap_or(planes.start);
         }
         Encoding::Gradient(gradient) => gradient.iterations = iterations.unwrap_or(gradient.iterations),
         _ if iterations.is_some() => return Err(without("iterations")),
@@ -74,16 +76,6 @@ pub(super) fn encode_settings(
         return Err(without("correction"));
     }
     Ok(settings)
-}
-
-pub(super) fn start(typed: StartArg) -> PlaneStart {
-    match typed {
-        StartArg::Field => PlaneStart::Field,
-        StartArg::Constant => PlaneStart::Constant,
-        StartArg::Random => PlaneStart::Random { seed: 1 },
-        StartArg::Quadratic => PlaneStart::Quadratic,
-        StartArg::Smooth => PlaneStart::Smooth { seed: 1 },
-    }
 }
 
 /// Depths as they were typed, or three over the content's.
@@ -169,14 +161,15 @@ pub(super) fn encode(args: &EncodeArgs) -> Result<Report> {
 /// A picture at one depth, or sorted by its depth map into several.
 fn encode_picture(args: &EncodeArgs, panel: &Panel, progress: &Progress, report: &mut Report) -> Result<Frame> {
     let begin = Instant::now();
-    let chosen = args.encoding.encoding.as_deref().unwrap_or("plane-gradient");
-    let method = Encoding::named(chosen)?;
-    let Encoding::Planes(method) = method else {
+    let usual = || Encoding::Planes(PlaneEncoding::new(PlaneMethod::Gradient));
+    let chosen = args.encoding.encoding.clone().unwrap_or_else(usual);
+    let Encoding::Planes(PlaneEncoding { method, .. }) = chosen else {
         let what = format!(
-            "{chosen} encodes a field, not a picture: take plane-gradient, weighted, gerchberg-saxton or double-constraint, \
-             or compute the field first"
+            "{} encodes a field, not a picture: take plane-gradient, weighted, gerchberg-saxton or double-constraint, \
+             or compute the field first",
+            chosen.name()
         );
-        return Err(Error::parameter("method", what));
+        return Err(Error::parameter("encoding", what));
     };
     let (rgb, map) = match input(&args.input)? {
         Input::Images(rgb, map) => (rgb, Some(map)),
@@ -188,15 +181,15 @@ fn encode_picture(args: &EncodeArgs, panel: &Panel, progress: &Progress, report:
         0 => Err(Error::parameter("depths", "give the depth at which the picture stands, such as --depths 100mm")),
         _ => Ok(depths),
     })?;
-    let flags = EncodingArgs { encoding: Some(chosen.into()), ..args.encoding.clone() };
+    let flags = EncodingArgs { encoding: Some(chosen), ..args.encoding.clone() };
     let settings = encode_settings(&flags, panel, None, report)?;
     let Encoding::Planes(given) = &settings.encoding else {
-        return Err(Error::parameter("method", "is for fields"));
+        return Err(Error::parameter("encoding", "is for fields"));
     };
     let first = match args.encoding.start {
-        Some(typed) => start(typed),
+        Some(typed) => typed,
         // Random phases bring light from all of the panel to all of the picture; a double constraint asks for smooth ones.
-        None if method.method == PlaneMethod::DoubleConstraint => PlaneStart::Field,
+        None if method == PlaneMethod::DoubleConstraint => PlaneStart::Field,
         None => PlaneStart::Random { seed: 1 },
     };
     let own = PlaneEncoding { start: first, depths: depths.clone(), ..given.clone() };

@@ -1,13 +1,14 @@
 //! `compute` of pictures that stay pictures: planes by fast transforms, in one colour or three.
 
-use super::args::{ComputeArgs, PhaseArg};
+use super::args::ComputeArgs;
 use super::colour::named;
-use super::load::{Input, Panel, channel, depth_scale, placed_by};
+use super::load::{Input, Panel, placed_by};
 use super::report::{Report, seconds};
 use holodrive::field::npy::{self, Content};
 use holodrive::hologram::layers::{self, SliceSettings};
 use holodrive::points::colour::NAMES;
 use holodrive::points::images::{RgbDepth, Window};
+use holodrive::points::placement::Phase;
 use holodrive::points::slices::{Light, Slices};
 use holodrive::progress::Progress;
 use holodrive::units::show_length;
@@ -25,7 +26,7 @@ pub(super) fn compute(
     let placement = placed_by(&args.placement);
     let slices = match (input, args.layers) {
         (Input::Images(rgb, depth), Some(count)) => {
-            let picture = RgbDepth::read(rgb, depth, depth_scale(args.placement.depth_scale), &placement)?;
+            let picture = RgbDepth::read(rgb, depth, args.placement.depth_scale, &placement)?;
             let window = Window::new(&placement, picture.size(), &panel.grid)?;
             Slices::of_depth(picture, window, &panel.grid, count)?
         }
@@ -36,15 +37,15 @@ pub(super) fn compute(
         _ => return Err(Error::parameter("layers", "layers are for a picture with depth (rgb.png+depth.png)")),
     };
     let seed = match args.placement.phase {
-        PhaseArg::Zero => None,
-        PhaseArg::Random => Some(args.light.seed),
-        PhaseArg::Path => {
+        Phase::Zero => None,
+        Phase::Random { .. } => Some(args.light.seed),
+        Phase::Path => {
             return Err(Error::parameter("phase", "path is for scenes; use zero or random with a picture"));
         }
     };
     let settings = SliceSettings { occlude: !args.see_through, random_phase: seed, memory: args.hologram.memory };
     let lights: Vec<(f64, Light)> = match &panel.lasers {
-        None => vec![(panel.wavelength, Light::Channel(channel(&args.hologram)))],
+        None => vec![(panel.wavelength, Light::Channel(args.hologram.channel))],
         Some(lasers) => (0..3).map(|i| (lasers.wavelengths()[i], Light::Laser(lasers, i))).collect(),
     };
     let colored = lights.len() > 1;

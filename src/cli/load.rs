@@ -1,21 +1,18 @@
 //! What was typed, resolved: panel, settings, and the points of whatever input there is.
 
-use super::args::{
-    ChannelArg, ColorArgs, DepthArg, EngineArg, FormFactorArg, HologramArgs, MirrorDepthArg, PanelArgs, PhaseArg,
-    PlacementArg, PlacementArgs, SceneArgs, Wavelengths, White,
-};
+use super::args::{ColorArgs, HologramArgs, PanelArgs, PlacementArg, PlacementArgs, SceneArgs, Wavelengths, White};
 use super::light::{report_cloud, report_light};
 use super::report::Report;
 use glam::DVec3;
 use holodrive::field::Grid;
-use holodrive::hologram::{HologramSettings, Method};
-use holodrive::illumination::{FormFactor, IlluminationSettings};
+use holodrive::hologram::HologramSettings;
+use holodrive::illumination::IlluminationSettings;
 use holodrive::panel::{PanelProfile, Wavefront, wavefront};
 use holodrive::pipeline::{self, Lit, SceneSettings};
 use holodrive::points::WhitePoint;
 use holodrive::points::colour::Lasers;
 use holodrive::points::placement::{Phase, SequenceAnchors};
-use holodrive::points::trace::{MirrorDepth, TraceSettings};
+use holodrive::points::trace::TraceSettings;
 use holodrive::points::{Channel, Placement, PointCloud, images, ply};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::Picture;
@@ -93,10 +90,6 @@ pub(super) fn panel_in_color(args: &PanelArgs, color: &ColorArgs, report: &mut R
 }
 
 pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, default_white: White) -> SceneSettings {
-    let form_factor = match light.form_factor {
-        FormFactorArg::Exact => FormFactor::Lambert,
-        FormFactorArg::Paper => FormFactor::Paper,
-    };
     SceneSettings {
         load: LoadOptions {
             camera: light.file.camera.as_deref().map(Choice::from),
@@ -106,7 +99,7 @@ pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, defau
             ..LoadOptions::default()
         },
         illumination: IlluminationSettings {
-            form_factor,
+            form_factor: light.form_factor,
             bounces: light.bounces,
             final_gather: light.final_gather,
             photons: light.photons,
@@ -117,19 +110,15 @@ pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, defau
             width: light.rays.0 as u32,
             height: light.rays.1 as u32,
             bounces: light.bounces,
-            mirror_depth: match light.mirror_depth {
-                MirrorDepthArg::Path => MirrorDepth::Path,
-                MirrorDepthArg::Focus => MirrorDepth::Focus,
-            },
+            mirror_depth: light.mirror_depth,
             seed: light.seed,
             ..TraceSettings::default()
         },
         points: light.points,
         placement: placed_by(placement),
         phase: match placement.phase {
-            PhaseArg::Zero => Phase::Zero,
-            PhaseArg::Random => Phase::Random { seed: light.seed },
-            PhaseArg::Path => Phase::Path,
+            Phase::Random { .. } => Phase::Random { seed: light.seed },
+            other => other,
         },
         white: match placement.white.unwrap_or(default_white) {
             White::Auto => WhitePoint::Auto,
@@ -148,37 +137,8 @@ pub(super) fn placed_by(args: &PlacementArgs) -> Placement {
     }
 }
 
-pub(super) fn depth_scale(scale: DepthArg) -> images::DepthScale {
-    match scale {
-        DepthArg::WhiteNear => images::DepthScale::WhiteNear,
-        DepthArg::BlackNear => images::DepthScale::BlackNear,
-    }
-}
-
-pub(super) fn hologram_settings(args: &HologramArgs, engine: Option<EngineArg>) -> HologramSettings {
-    HologramSettings {
-        error: args.error,
-        method: engine.map(|engine| match engine {
-            EngineArg::Oracle => Method::Oracle,
-            EngineArg::Direct => Method::Direct,
-            EngineArg::Tiles => Method::Tiles,
-            EngineArg::Planes => Method::Planes,
-            EngineArg::Gpu => Method::Gpu,
-            EngineArg::GpuPlanes => Method::GpuPlanes,
-            EngineArg::Recurrence => Method::Recurrence,
-        }),
-        memory: args.memory,
-        ..HologramSettings::default()
-    }
-}
-
-pub(super) fn channel(args: &HologramArgs) -> Channel {
-    match args.channel {
-        ChannelArg::Luminance => Channel::Luminance,
-        ChannelArg::Red => Channel::Red,
-        ChannelArg::Green => Channel::Green,
-        ChannelArg::Blue => Channel::Blue,
-    }
+pub(super) fn hologram_settings(args: &HologramArgs) -> HologramSettings {
+    HologramSettings { error: args.error, method: args.engine, memory: args.memory, ..HologramSettings::default() }
 }
 
 /// What kind of file an input is, by its name.
@@ -294,7 +254,6 @@ pub(super) fn load_points(
             Ok(Points { cloud: read.cloud, metadata, lit: None, path_eye })
         }
         Input::Images(rgb, depth) => {
-            let scale = depth_scale(placement.depth_scale);
             let seed = match settings.phase {
                 Phase::Zero => None,
                 Phase::Random { seed } => Some(seed),
@@ -302,7 +261,7 @@ pub(super) fn load_points(
                     return Err(Error::parameter("phase", "path is for scenes; use zero or random with a picture"));
                 }
             };
-            let cloud = images::read(rgb, depth, scale, &settings.placement, seed, &panel.grid)?;
+            let cloud = images::read(rgb, depth, placement.depth_scale, &settings.placement, seed, &panel.grid)?;
             report_cloud(&cloud, begin.elapsed().as_secs_f64(), report);
             let metadata = ply::Metadata { scene: rgb.display().to_string(), ..ply::Metadata::default() };
             Ok(Points { cloud, metadata, lit: None, path_eye: None })

@@ -18,29 +18,25 @@ mod load;
 mod monitors;
 mod parallax;
 mod print;
-mod print_args;
 mod print_preview;
 mod report;
-mod scene_args;
 #[cfg(feature = "display")]
 mod screen;
 mod sequence;
-mod sequence_args;
 mod serve;
-mod serve_args;
 mod show;
 mod subframes;
 mod true_views;
 
 use args::{Cli, Command};
-use clap::Parser;
+use clap::FromArgMatches;
 use clap::error::ErrorKind;
 use holodrive::Error;
 use std::process::ExitCode;
 
 /// Parses, runs and maps the outcome to an exit code: 0 done, 2 bad flags or input, 130 interrupted.
 pub(crate) fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match args::command().try_get_matches().and_then(|typed| Cli::from_arg_matches(&typed)) {
         Ok(cli) => cli,
         Err(refused) if matches!(refused.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
             // Help into a closed pipe (`holodrive --help | head -1`) is no failure.

@@ -1,9 +1,8 @@
 //! Plates: planned, computed, checked, looked at, exported.
 
-use super::args::{ExportArgs, ExportFormat, PrintArgs, PrintCommand, VerifyArgs, White};
+use super::args::{ExportArgs, ExportFormat, FileArgs, PrintArgs, PrintCommand, VerifyArgs, White};
 use super::bar::Bar;
 use super::report::{Report, count, seconds};
-use super::scene_args::FileArgs;
 use holodrive::files;
 use holodrive::hologram::InstructionSet;
 use holodrive::print::export::{Format, Frames, export};

@@ -1,7 +1,7 @@
 //! What an eye sees of a finished plate, and what it should see.
 
+use super::args::PreviewArgs;
 use super::bar::Bar;
-use super::print_args::PreviewArgs;
 use super::report::{Report, seconds};
 use holodrive::points::colour::Lasers;
 use holodrive::print::preview::{Preview, PreviewSettings, preview};

@@ -1,13 +1,16 @@
 //! What a command did: lines for people, JSON for machines.
 
 use holodrive::{Error, Result};
+use serde::Serialize;
 use serde_json::{Map, Value};
 use std::io::Write;
+use std::path::Path;
 
-/// A report in the order in which its entries were added.
+/// Values for machines, lines for people, warnings for both.
 #[derive(Debug, Default)]
 pub(crate) struct Report {
-    entries: Vec<(String, Value, String)>,
+    values: Map<String, Value>,
+    lines: Vec<String>,
     warnings: Vec<String>,
 }
 
@@ -15,26 +18,51 @@ impl Report {
     /// For the command `name`.
     pub(crate) fn new(name: &str) -> Self {
         let mut report = Self::default();
-        report.entries.push(("command".into(), name.into(), String::new()));
+        report.value("command", name);
         report
     }
-    /// Adds a value for machines with the line for people (empty: none).
-    pub(crate) fn add(&mut self, key: &str, value: impl Into<Value>, line: impl Into<String>) {
-        self.entries.push((key.into(), value.into(), line.into()));
+    /// Adds all fields of a struct, each under its name.
+    pub(crate) fn section(&mut self, fields: impl Serialize) {
+        if let Value::Object(fields) = json(fields) {
+            self.values.extend(fields);
+        }
     }
-    /// Adds anything that serialises.
-    pub(crate) fn add_serialised(&mut self, key: &str, value: &impl serde::Serialize, line: impl Into<String>) {
-        // A report is plain data; what cannot be JSON (a NaN) becomes null.
-        let value = serde_json::to_value(value).unwrap_or(Value::Null);
+    /// Adds a value for machines.
+    pub(crate) fn value(&mut self, key: &str, value: impl Serialize) {
+        self.values.insert(key.into(), json(value));
+    }
+    /// Adds a line for people.
+    pub(crate) fn line(&mut self, line: impl Into<String>) {
+        self.lines.push(line.into());
+    }
+    /// Adds a value for machines with the line for people (empty: none).
+    pub(crate) fn add(&mut self, key: &str, value: impl Serialize, line: impl Into<String>) {
+        if !key.is_empty() {
+            self.value(key, value);
+        }
+        let line = line.into();
+        if !line.is_empty() {
+            self.line(line);
+        }
+    }
+    /// Adds what serialises, by reference.
+    pub(crate) fn add_serialised(&mut self, key: &str, value: &impl Serialize, line: impl Into<String>) {
         self.add(key, value, line);
+    }
+    /// Adds what was written, and where.
+    pub(crate) fn output(&mut self, what: &str, path: &Path) {
+        self.file("output", what, path);
+    }
+    /// Adds a file that was written, under a key of its own.
+    pub(crate) fn file(&mut self, key: &str, what: &str, path: &Path) {
+        self.add(key, path.display().to_string(), format!("{what:<12} {}", path.display()));
     }
     /// Adds the report of a part: an object under its name for machines, its lines under `line` for people.
     pub(crate) fn add_part(&mut self, name: &str, line: impl Into<String>, part: Self) {
         self.add(name, part.json(), line);
         let new: Vec<String> = part.warnings.into_iter().filter(|w| !self.warnings.contains(w)).collect();
         self.warnings.extend(new);
-        let lines = part.entries.into_iter().map(|(_, _, line)| line).filter(|line| !line.is_empty());
-        self.entries.extend(lines.map(|line| (String::new(), Value::Null, format!("  {line}"))));
+        self.lines.extend(part.lines.iter().map(|line| format!("  {line}")));
     }
     /// Adds warnings; they go to standard error at once, and into the JSON.
     pub(crate) fn warn<W: ToString>(&mut self, warnings: impl IntoIterator<Item = W>) {
@@ -48,28 +76,33 @@ impl Report {
     }
     /// The report as JSON.
     pub(crate) fn json(&self) -> Value {
-        let mut map: Map<String, Value> =
-            self.entries.iter().filter(|(k, _, _)| !k.is_empty()).map(|(k, v, _)| (k.clone(), v.clone())).collect();
-        map.insert("warnings".into(), self.warnings.clone().into());
-        Value::Object(map)
+        let mut all = self.values.clone();
+        all.insert("warnings".into(), self.warnings.clone().into());
+        Value::Object(all)
     }
     /// Prints it on standard output.
     pub(crate) fn print(&self, json: bool) -> Result<()> {
-        let mut text = String::new();
-        if json {
-            text = serde_json::to_string_pretty(&self.json()).unwrap_or_default() + "\n";
+        let text = if json {
+            serde_json::to_string_pretty(&self.json()).unwrap_or_default() + "\n"
         } else {
-            for (_, _, line) in self.entries.iter().filter(|(_, _, line)| !line.is_empty()) {
-                text += line;
-                text.push('\n');
-            }
-        }
+            self.lines.iter().flat_map(|line| [line.as_str(), "\n"]).collect()
+        };
         match std::io::stdout().write_all(text.as_bytes()) {
             // A reader that has seen enough (`| head`) is no failure.
             Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
             other => other.map_err(|source| Error::Io { path: "standard output".into(), source }),
         }
     }
+}
+
+/// A report is plain data; what cannot be JSON (a NaN) becomes null.
+fn json(value: impl Serialize) -> Value {
+    serde_json::to_value(value).unwrap_or(Value::Null)
+}
+
+/// A line that begins with a step's name and how long it took.
+pub(crate) fn step(name: &str, took: f64, what: impl std::fmt::Display) -> String {
+    format!("{name:<12} {:>8}  {what}", seconds(took)).trim_end().to_owned()
 }
 
 /// Seconds with as many digits as they deserve.

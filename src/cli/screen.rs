@@ -1,11 +1,9 @@
 //! Frames on a real monitor.
 
-use super::args::{AbsenceArg, PresenterArg, ShowArgs};
+use super::args::{Ahead, ShowArgs};
 use super::report::{Report, count, seconds};
-use super::sequence_args::Ahead;
 use holodrive::display::{
-    self, Display, DisplayFrame, FrameTime, OnAbsence, PlayReport, PlaySettings, Presenter, ShowSettings,
-    WindowSettings,
+    self, Display, DisplayFrame, FrameTime, PlayReport, PlaySettings, Presenter, ShowSettings, WindowSettings,
 };
 use holodrive::panel::Frame;
 use holodrive::progress::Progress;
@@ -162,21 +160,12 @@ pub(super) fn show_settings(args: &ShowArgs) -> Result<Option<ShowSettings>> {
         Some(hold) => return Err(Error::parameter("hold", format!("{hold} is not a number of seconds"))),
         None => None,
     };
-    let on_absence = match args.on_absence {
-        AbsenceArg::End => OnAbsence::End,
-        AbsenceArg::Wait => OnAbsence::Wait,
-    };
     let window = window_settings(args.present, args.allow_altered_levels, args.trigger_patch.as_deref())?;
-    Ok(Some(ShowSettings { window, hold, on_absence, ..ShowSettings::new(name.parse()?) }))
+    Ok(Some(ShowSettings { window, hold, on_absence: args.on_absence, ..ShowSettings::new(name.parse()?) }))
 }
 
 /// How a panel's window is made.
-pub(super) fn window_settings(presenter: PresenterArg, altered: bool, trigger: Option<&str>) -> Result<WindowSettings> {
-    let presenter = match presenter {
-        PresenterArg::Auto => Presenter::Auto,
-        PresenterArg::Gpu => Presenter::Gpu,
-        PresenterArg::Software => Presenter::Software,
-    };
+pub(super) fn window_settings(presenter: Presenter, altered: bool, trigger: Option<&str>) -> Result<WindowSettings> {
     let trigger = trigger.map(str::parse).transpose()?;
     Ok(WindowSettings { presenter, exact: !altered, trigger, ..WindowSettings::default() })
 }

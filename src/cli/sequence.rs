@@ -1,12 +1,12 @@
 //! `show` of frames in time: which input is one, and prepared frames on a monitor or on the simulated panel.
 
-use super::args::{RawFormatArg, ShowArgs};
+#[cfg(feature = "display")]
+use super::args::Ahead;
+use super::args::ShowArgs;
 use super::bar::Bar;
 use super::commands::depth;
 use super::load;
 use super::report::{Report, count, seconds};
-#[cfg(feature = "display")]
-use super::sequence_args::Ahead;
 use super::show::finish;
 #[cfg(feature = "display")]
 use holodrive::display::{DisplayFrame, PlaySettings};
@@ -17,7 +17,7 @@ use holodrive::pipeline;
 use holodrive::progress::Progress;
 use holodrive::reconstruction::{self, Picture, View};
 use holodrive::sequence::prepared::pictures_in;
-use holodrive::sequence::{ContactSheet, Prepared, RawFormat, Shown, Source};
+use holodrive::sequence::{ContactSheet, Prepared, Shown, Source};
 use holodrive::{Error, Result, files};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -45,12 +45,7 @@ pub(super) fn asked(args: &ShowArgs) -> Result<Option<Sequence>> {
         return Err(Error::parameter("raw", "takes one input; leave the further ones out"));
     }
     if let Some((width, height)) = wanted.raw {
-        let format = match wanted.raw_format {
-            RawFormatArg::Gray => RawFormat::Gray,
-            RawFormatArg::Gray16 => RawFormat::Gray16,
-            RawFormatArg::Mono => RawFormat::Mono,
-            RawFormatArg::Rgb => RawFormat::Rgb,
-        };
+        let format = wanted.raw_format;
         return prepared(Source::Raw { path: (!standard).then(|| input.clone()), width, height, format });
     }
     if standard {

@@ -1,13 +1,13 @@
 //! `serve`: keeps the panel and shows on it what other programs send.
 
-use super::args::{OnClientGoneArg, ServeArgs, ServedLevelsArg};
+use super::args::{ServeArgs, ServedLevelsArg};
 use super::bar::Bar;
 use super::load::{Panel, panel, panel_correction};
 use super::report::{Report, seconds};
 use holodrive::panel::{Frame, Modulation};
 use holodrive::progress::Progress;
 use holodrive::serve::{
-    self, Driver, KeepReport, KeepSettings, OnClientGone, Output, ServeSettings, ServedPanel, Server, SimulatedOutput,
+    self, Driver, KeepReport, KeepSettings, Output, ServeSettings, ServedPanel, Server, SimulatedOutput,
 };
 use holodrive::units::show_length;
 use holodrive::{Error, Result, files};
@@ -187,10 +187,7 @@ impl Job<'_> {
 
     fn keep(&self, server: &Server, output: &mut dyn Output, place: &str) -> Result<KeepReport> {
         self.tell(server, place)?;
-        let on_client_gone = match self.args.on_client_gone {
-            OnClientGoneArg::Keep => OnClientGone::Keep,
-            OnClientGoneArg::Idle => OnClientGone::Idle,
-        };
+        let on_client_gone = self.args.on_client_gone;
         serve::keep(server, output, (self.driver, self.idle), KeepSettings { on_client_gone }, self.progress)
     }
 

@@ -5,7 +5,7 @@ use super::bar::Bar;
 use super::colour;
 use super::commands::{content, origin, report_field, write_traced, write_view};
 use super::encoding::encode_field;
-use super::load::{self, Input, Panel, Points, channel, hologram_settings, load_points, luminance_picture};
+use super::load::{self, Input, Panel, Points, hologram_settings, load_points, luminance_picture};
 use super::report::{Report, count, seconds};
 use super::sequence;
 use holodrive::field::Field;
@@ -90,10 +90,10 @@ fn run(args: &ShowArgs) -> Result<Report> {
             let points =
                 load_points(&source, (&args.light, &args.placement, White::Auto), &panel, &bar.progress, &mut report)?;
             write_points(out, &points, &mut report)?;
-            let settings = hologram_settings(&args.hologram, args.engine);
+            let settings = hologram_settings(&args.hologram);
             let computed = pipeline::field(
                 &points.cloud,
-                channel(&args.hologram),
+                args.hologram.channel,
                 &panel.grid,
                 panel.wavelength,
                 &settings,

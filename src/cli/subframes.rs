@@ -3,7 +3,7 @@
 use super::args::ShowArgs;
 use super::commands::{content, origin, report_field, write_view};
 use super::encoding::encode_field;
-use super::load::{Panel, Points, channel, hologram_settings};
+use super::load::{Panel, Points, hologram_settings};
 use super::report::Report;
 use holodrive::field::npy;
 use holodrive::panel::simulated::Simulation;
@@ -44,7 +44,7 @@ pub(super) fn frames(
     progress: &Progress,
     report: &mut Report,
 ) -> Result<Vec<Frame>> {
-    let settings = hologram_settings(&args.hologram, args.engine);
+    let settings = hologram_settings(&args.hologram);
     let multiplexing = if args.sparse { Multiplexing::Sparse } else { Multiplexing::Phases };
     let subframes = SubFrames { count: args.subframes, multiplexing, seed: args.light.seed };
     if multiplexing == Multiplexing::Sparse && points.cloud.points.len() < args.subframes {
@@ -54,7 +54,7 @@ pub(super) fn frames(
     let content = content(&points.cloud, &points.metadata);
     let mut frames = Vec::new();
     for index in 0..args.subframes {
-        let share = subframes.points(&points.cloud, channel(&args.hologram), index);
+        let share = subframes.points(&points.cloud, args.hologram.channel, index);
         let computed = pipeline::field_of(&share, &panel.grid, panel.wavelength, &settings, progress)?;
         let mut part = Report::new("show");
         report_field(&computed, &mut part);

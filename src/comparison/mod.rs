@@ -34,6 +34,7 @@ use crate::encode::{
 };
 use crate::error::Result;
 use crate::field::{Complex32, Field, Grid};
+use crate::names::Named;
 use crate::panel::simulated::illuminate;
 use crate::panel::{Curve, Faults, Frame, Illumination, Modulation, PanelProfile, Response, Simulation, simulate};
 use crate::progress::Progress;
@@ -121,7 +122,7 @@ const BAND: f64 = 0.45;
 
 /// All encodings of the table, by name.
 pub fn encodings() -> Vec<&'static str> {
-    Encoding::NAMES.to_vec()
+    Encoding::NAMES.iter().map(|(name, ..)| *name).collect()
 }
 
 /// Encodes a picture and measures what comes of it.

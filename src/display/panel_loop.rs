@@ -9,6 +9,7 @@ use super::presenter::Presenter;
 use super::session::Display;
 use super::window::{PanelWindow, Standing, WindowSettings};
 use crate::error::{Error, Result};
+use crate::names::{Name, Named};
 use crate::progress::Progress;
 use serde::Serialize;
 use std::sync::Arc;
@@ -22,6 +23,12 @@ pub enum OnAbsence {
     End,
     /// Wait until it is back, then go on.
     Wait,
+}
+
+impl Named for OnAbsence {
+    const KIND: &'static str = "on absence";
+    const NAMES: &'static [Name<Self>] =
+        &[("end", || Self::End, "end, and report it"), ("wait", || Self::Wait, "wait until it is back, then go on")];
 }
 
 /// How frames are shown on a monitor.

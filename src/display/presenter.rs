@@ -2,6 +2,7 @@
 
 use super::frame::DisplayFrame;
 use crate::error::{Error, Result};
+use crate::names::{Name, Named};
 use pixels::wgpu;
 use pixels::{Pixels, PixelsBuilder, SurfaceTexture};
 use serde::Serialize;
@@ -9,7 +10,6 @@ use std::fmt;
 use std::future::Future;
 use std::num::NonZeroU32;
 use std::pin::pin;
-use std::str::FromStr;
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Waker};
 use winit::window::Window;
@@ -27,17 +27,13 @@ pub enum Presenter {
     Software,
 }
 
-impl FromStr for Presenter {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        match text {
-            "auto" => Ok(Self::Auto),
-            "gpu" => Ok(Self::Gpu),
-            "software" => Ok(Self::Software),
-            _ => Err(Error::parameter("presenter", format!("\"{text}\" is not one of auto, gpu, software"))),
-        }
-    }
+impl Named for Presenter {
+    const KIND: &'static str = "presenter";
+    const NAMES: &'static [Name<Self>] = &[
+        ("auto", || Self::Auto, "the graphics card where there is one"),
+        ("gpu", || Self::Gpu, "the graphics card"),
+        ("software", || Self::Software, "the processor"),
+    ];
 }
 
 /// A presenter at work on one window.

@@ -7,6 +7,7 @@ use super::iterative::{
 use super::{DoublePhase, EncodedPattern, Interlace, band, double_phase};
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Field};
+use crate::names::{Name, Named};
 use crate::panel::{EncodingRecord, Illumination, Modulation, PanelProfile, Pattern};
 use crate::progress::Progress;
 use crate::propagation::{Aperture, propagate};
@@ -76,6 +77,17 @@ pub enum PlaneStart {
         /// The seed.
         seed: u64,
     },
+}
+
+impl Named for PlaneStart {
+    const KIND: &'static str = "start";
+    const NAMES: &'static [Name<Self>] = &[
+        ("field", || Self::Field, "the field's own"),
+        ("constant", || Self::Constant, "the same everywhere"),
+        ("random", || Self::Random { seed: 1 }, "random: speckle"),
+        ("quadratic", || Self::Quadratic, "a lens: no speckle"),
+        ("smooth", || Self::Smooth { seed: 1 }, "random, changing smoothly"),
+    ];
 }
 
 /// Settings of the encodings by amplitudes on planes.

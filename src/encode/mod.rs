@@ -44,6 +44,7 @@ pub use off_axis::{OffAxis, Reference};
 
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Complex64, Field};
+use crate::names::{Name, Named};
 use crate::panel::simulated::illuminate;
 use crate::panel::{EncodingRecord, Frame, Illumination, Modulation, PanelProfile, Pattern, Wavefront, drive};
 use crate::progress::Progress;
@@ -75,60 +76,28 @@ pub enum Encoding {
     Binary(BinaryFringe),
 }
 
-impl Encoding {
-    /// Names as the command line and metadata write them.
-    pub const NAMES: [&'static str; 16] = [
-        "double-phase",
-        "kinoform",
-        "off-axis-bipolar",
-        "off-axis-intensity",
-        "single-side-band",
-        "error-diffusion",
-        "gradient",
-        "plane-gradient",
-        "gerchberg-saxton",
-        "weighted",
-        "double-constraint",
-        "burckhardt",
-        "lee",
-        "binary-threshold",
-        "binary-diffusion",
-        "binary-search",
+impl Named for Encoding {
+    const KIND: &'static str = "encoding";
+    const NAMES: &'static [Name<Self>] = &[
+        ("double-phase", || Self::DoublePhase(DoublePhase::default()), "two phases for one complex value, interlaced"),
+        ("kinoform", || Self::Kinoform, "the field's phase alone"),
+        ("off-axis-bipolar", || Self::OffAxisBipolar(OffAxis::default()), "fringes with an oblique reference, raised"),
+        ("off-axis-intensity", || Self::OffAxisIntensity(OffAxis::default()), "interference as a plate records it"),
+        ("single-side-band", || Self::SingleSideBand(OffAxis::default()), "fringes of the upper half of the band"),
+        ("error-diffusion", || Self::ErrorDiffusion(ErrorDiffusion::default()), "phase alone, its error handed on"),
+        ("gradient", || Self::Gradient(BandGradient::default()), "the complex field by gradient descent"),
+        ("plane-gradient", || planes(PlaneMethod::Gradient), "amplitudes at depths by gradient descent"),
+        ("gerchberg-saxton", || planes(PlaneMethod::GerchbergSaxton), "amplitudes at depths by projections"),
+        ("weighted", || planes(PlaneMethod::Weighted), "the same, what is too dark weighted up"),
+        ("double-constraint", || planes(PlaneMethod::DoubleConstraint), "amplitude and phase at depths: no speckle"),
+        ("burckhardt", || cells(Cell::Burckhardt), "three amplitudes for one complex value"),
+        ("lee", || cells(Cell::Lee), "four amplitudes for one complex value"),
+        ("binary-threshold", || binary(Binarisation::Threshold), "fringes of two amplitudes by threshold"),
+        ("binary-diffusion", || binary(Binarisation::ErrorDiffusion), "the same by error diffusion"),
+        ("binary-search", || binary(Binarisation::DirectSearch { sweeps: 5 }), "the same by direct search"),
     ];
 
-    /// The encoding of that name with its default settings.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] that lists the names.
-    pub fn named(name: &str) -> Result<Self> {
-        let planes = |method| Self::Planes(PlaneEncoding::new(method));
-        let binary = |method| Self::Binary(BinaryFringe::new(method));
-        Ok(match name {
-            "double-phase" => Self::DoublePhase(DoublePhase::default()),
-            "kinoform" => Self::Kinoform,
-            "off-axis-bipolar" => Self::OffAxisBipolar(OffAxis::default()),
-            "off-axis-intensity" => Self::OffAxisIntensity(OffAxis::default()),
-            "single-side-band" => Self::SingleSideBand(OffAxis::default()),
-            "error-diffusion" => Self::ErrorDiffusion(ErrorDiffusion::default()),
-            "gradient" => Self::Gradient(BandGradient::default()),
-            "plane-gradient" => planes(PlaneMethod::Gradient),
-            "gerchberg-saxton" => planes(PlaneMethod::GerchbergSaxton),
-            "weighted" => planes(PlaneMethod::Weighted),
-            "double-constraint" => planes(PlaneMethod::DoubleConstraint),
-            "burckhardt" => Self::Cells(CellHologram { cell: Cell::Burckhardt, percentile: 0.999 }),
-            "lee" => Self::Cells(CellHologram { cell: Cell::Lee, percentile: 0.999 }),
-            "binary-threshold" => binary(Binarisation::Threshold),
-            "binary-diffusion" => binary(Binarisation::ErrorDiffusion),
-            "binary-search" => binary(Binarisation::DirectSearch { sweeps: 5 }),
-            _ => {
-                let what = format!("`{name}` is no encoding; use one of {}", Self::NAMES.join(", "));
-                return Err(Error::parameter("method", what));
-            }
-        })
-    }
-
-    /// Its name.
-    pub fn name(&self) -> &'static str {
+    fn name(&self) -> &'static str {
         match self {
             Self::DoublePhase(_) => "double-phase",
             Self::Kinoform => "kinoform",
@@ -142,7 +111,21 @@ impl Encoding {
             Self::Binary(settings) => settings.method.name(),
         }
     }
+}
 
+fn planes(method: PlaneMethod) -> Encoding {
+    Encoding::Planes(PlaneEncoding::new(method))
+}
+
+fn cells(cell: Cell) -> Encoding {
+    Encoding::Cells(CellHologram { cell, percentile: 0.999 })
+}
+
+fn binary(method: Binarisation) -> Encoding {
+    Encoding::Binary(BinaryFringe::new(method))
+}
+
+impl Encoding {
     /// What its pattern modulates.
     pub fn modulation(&self) -> Modulation {
         match self {

@@ -26,6 +26,7 @@ pub use sources::Coverage;
 
 use crate::error::{Error, Result};
 use crate::field::{Field, Grid};
+use crate::names::{Name, Named};
 use crate::points::PointSource;
 use crate::progress::Progress;
 use definition::Optics;
@@ -54,19 +55,17 @@ pub enum Method {
     Recurrence,
 }
 
-impl Method {
-    /// Its name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Oracle => "oracle",
-            Self::Direct => "direct",
-            Self::Tiles => "tiles",
-            Self::Planes => "planes",
-            Self::Gpu => "gpu",
-            Self::GpuPlanes => "gpu-planes",
-            Self::Recurrence => "recurrence",
-        }
-    }
+impl Named for Method {
+    const KIND: &'static str = "engine";
+    const NAMES: &'static [Name<Self>] = &[
+        ("oracle", || Self::Oracle, "double precision, term by term: slow, for tests"),
+        ("direct", || Self::Direct, "vectorised sum to 1e-4"),
+        ("tiles", || Self::Tiles, "vectorised sum over tiles as large as the error allows"),
+        ("planes", || Self::Planes, "spectral wavefront recording planes"),
+        ("gpu", || Self::Gpu, "vectorised sum on a graphics processor"),
+        ("gpu-planes", || Self::GpuPlanes, "recording planes on a graphics processor"),
+        ("recurrence", || Self::Recurrence, "the difference method, for comparison"),
+    ];
 }
 
 /// How a point's wave is limited to what the panel can diffract.

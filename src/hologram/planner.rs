@@ -17,6 +17,7 @@ use super::{gpu, tiles::Class};
 use super::{near, oracle, recurrence};
 use crate::error::{Error, Result};
 use crate::field::Grid;
+use crate::names::Named;
 use crate::points::PointSource;
 use crate::progress::Progress;
 

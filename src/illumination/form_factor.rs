@@ -3,6 +3,7 @@
 //! A Lambertian emitter sends (1/π)∫cosθ dω into a cone. The seed paper's eq. (1), Φ_in = Φ_out·S/(2π)·cosθ, divides by
 //! 2π: over the whole hemisphere it sends out one half. [`FormFactor::Paper`] keeps it for comparison.
 
+use crate::names::{Name, Named};
 use glam::DVec3;
 use std::f64::consts::{FRAC_1_PI, TAU};
 
@@ -14,6 +15,14 @@ pub enum FormFactor {
     Lambert,
     /// (1/2π)∫cosθ dω, eq. (1) of the seed paper: half of the flux is lost at every transfer.
     Paper,
+}
+
+impl Named for FormFactor {
+    const KIND: &'static str = "form factor";
+    const NAMES: &'static [Name<Self>] = &[
+        ("exact", || Self::Lambert, "1/π, polygons"),
+        ("paper", || Self::Paper, "eq. (1) of the seed paper: half of the light is lost"),
+    ];
 }
 
 impl FormFactor {

@@ -5,6 +5,7 @@ use super::{PointCloud, PointSource, luminance};
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::files;
+use crate::names::{Name, Named};
 use crate::random::Random;
 use crate::scene::texture::linear_from_srgb;
 use glam::DVec3;
@@ -19,6 +20,12 @@ pub enum DepthScale {
     WhiteNear,
     /// Black is near, white is far.
     BlackNear,
+}
+
+impl Named for DepthScale {
+    const KIND: &'static str = "depth scale";
+    const NAMES: &'static [Name<Self>] =
+        &[("white-near", || Self::WhiteNear, "white is near"), ("black-near", || Self::BlackNear, "black is near")];
 }
 
 /// The viewing window that a picture fills: the panel as seen from the eye.

@@ -23,6 +23,7 @@ pub use trace::{TraceSettings, Traced, TracedPoint, trace};
 pub use view::SceneView;
 pub use white::{WhiteLevel, WhitePoint};
 
+use crate::names::{Name, Named};
 use glam::DVec3;
 
 /// One point of light in the hologram frame.
@@ -57,6 +58,16 @@ pub enum Channel {
     Green,
     /// Linear blue.
     Blue,
+}
+
+impl Named for Channel {
+    const KIND: &'static str = "channel";
+    const NAMES: &'static [Name<Self>] = &[
+        ("luminance", || Self::Luminance, "the whole scene in one colour"),
+        ("red", || Self::Red, "linear red"),
+        ("green", || Self::Green, "linear green"),
+        ("blue", || Self::Blue, "linear blue"),
+    ];
 }
 
 /// Rec.709 luminance of linear RGB.

@@ -9,6 +9,7 @@
 use super::{Channel, PointCloud, PointSource};
 use crate::error::{Error, Result};
 use crate::field::Grid;
+use crate::names::{Name, Named};
 use crate::random::Random;
 use crate::scene::{Camera, Projection, Scene};
 use glam::{DMat3, DMat4, DVec2, DVec3};
@@ -56,6 +57,15 @@ pub enum Phase {
     },
     /// −k × (distance from the eye): all waves reach the eye in step.
     Path,
+}
+
+impl Named for Phase {
+    const KIND: &'static str = "phase";
+    const NAMES: &'static [Name<Self>] = &[
+        ("zero", || Self::Zero, "all points in step"),
+        ("random", || Self::Random { seed: 1 }, "as from a matte surface"),
+        ("path", || Self::Path, "all waves reach the eye in step"),
+    ];
 }
 
 /// What does not change from frame to frame of a sequence, so that what stands still in the scene stands still before

@@ -8,6 +8,7 @@
 
 use crate::error::{Error, Result};
 use crate::illumination::Illumination;
+use crate::names::{Name, Named};
 use crate::points::eye::{Eye, Seen};
 use crate::points::placement::WorldPoint;
 use crate::progress::Progress;
@@ -25,6 +26,14 @@ pub enum MirrorDepth {
     /// Where the eye focuses: also right for curved mirrors, lenses and glass plates.
     #[default]
     Focus,
+}
+
+impl Named for MirrorDepth {
+    const KIND: &'static str = "mirror depth";
+    const NAMES: &'static [Name<Self>] = &[
+        ("path", || Self::Path, "the length of the path, as in the seed paper"),
+        ("focus", || Self::Focus, "where the eye focuses"),
+    ];
 }
 
 /// Ends of a ray that bring less than this part of its light make no point of their own.

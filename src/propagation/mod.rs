@@ -17,6 +17,7 @@ pub use scaled::{ScaledPropagator, propagate_scaled};
 
 use crate::error::{Error, Result};
 use crate::field::{Complex, Fft2, Field, Grid};
+use crate::names::{Name, Named};
 use crate::progress::Progress;
 use rustfft::FftNum;
 use serde::{Deserialize, Serialize};
@@ -29,6 +30,14 @@ pub enum Kernel {
     AngularSpectrum,
     /// Paraxial: f_z = 1/λ − λf²/2 (Fresnel). The error grows as πλ³f⁴d/4 [rad].
     Fresnel,
+}
+
+impl Named for Kernel {
+    const KIND: &'static str = "kernel";
+    const NAMES: &'static [Name<Self>] = &[
+        ("angular-spectrum", || Self::AngularSpectrum, "Helmholtz, exact"),
+        ("fresnel", || Self::Fresnel, "paraxial"),
+    ];
 }
 
 /// How a field is carried.

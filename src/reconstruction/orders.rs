@@ -68,6 +68,7 @@ mod tests {
     use super::*;
     use crate::encode::{EncodeSettings, Encoding, blaze_and_lens, encode};
     use crate::field::Complex32;
+    use crate::names::Named;
     use crate::panel::{PanelProfile, Simulation, simulate};
     use std::path::Path;
 

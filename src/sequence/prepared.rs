@@ -6,6 +6,7 @@
 
 use crate::error::{Error, Result};
 use crate::field::npy_stack::LevelStack;
+use crate::names::{Name, Named};
 use crate::panel::{Frame, FrameMetadata, PanelProfile, VideoFrame};
 use crate::progress::Progress;
 use piped::Piped;
@@ -45,6 +46,16 @@ pub enum RawFormat {
     Mono,
     /// Three bytes, red, green and blue: the video signal.
     Rgb,
+}
+
+impl Named for RawFormat {
+    const KIND: &'static str = "raw format";
+    const NAMES: &'static [Name<Self>] = &[
+        ("gray", || Self::Gray, "a byte: the drive level"),
+        ("gray16", || Self::Gray16, "two bytes, the low one first: the drive level"),
+        ("mono", || Self::Mono, "a bit, the first of eight in the high one: on or off"),
+        ("rgb", || Self::Rgb, "red, green and blue: the video signal as it is"),
+    ];
 }
 
 impl RawFormat {

@@ -4,6 +4,7 @@ use super::output::{Output, Readiness};
 use super::{Flip, SentFrame, ServeCounts, ServedPanel, Server};
 use crate::error::{Error, Result};
 use crate::field::Grid;
+use crate::names::{Name, Named};
 use crate::panel::{
     Applied, Frame, FrameMetadata, FringePattern, Modulation, NearestTable, PanelProfile, Pattern, PhasePattern,
     Wavefront, drive,
@@ -24,6 +25,12 @@ pub enum OnClientGone {
     Keep,
     /// The idle frame. slmsuite's clients connect anew for each frame: of them it cannot be known, and theirs stays.
     Idle,
+}
+
+impl Named for OnClientGone {
+    const KIND: &'static str = "on client gone";
+    const NAMES: &'static [Name<Self>] =
+        &[("keep", || Self::Keep, "its last frame"), ("idle", || Self::Idle, "the idle frame")];
 }
 
 /// How the panel is kept.

@@ -9,6 +9,7 @@
 use glam::DVec3;
 use holodrive::field::{Complex32, Complex64, Grid, relative_error};
 use holodrive::hologram::{Cull, HologramSettings, InstructionSet, Method, compute, gpu_adapter, oracle_at, plan};
+use holodrive::names::Named;
 use holodrive::points::PointSource;
 use holodrive::progress::Progress;
 use holodrive::random::Random;

@@ -4,8 +4,10 @@
 use crate::desk::PATIENCE;
 use crate::frames::{Pattern, Picture};
 use holodrive::display::{
-    Display, OnAbsence, PanelWindow, PlaySettings, ShowSettings, Standing, WindowSettings, examine, play, show,
+    Display, OnAbsence, PanelWindow, PlaySettings, Presenter, ShowSettings, Standing, WindowSettings, examine, play,
+    show,
 };
+use holodrive::names::Named;
 use holodrive::progress::Progress;
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
@@ -68,7 +70,11 @@ impl ShowJob {
     }
 
     fn window(&self) -> holodrive::Result<WindowSettings> {
-        Ok(WindowSettings { presenter: self.presenter.parse()?, exact: self.exact, ..WindowSettings::default() })
+        Ok(WindowSettings {
+            presenter: Presenter::named(&self.presenter)?,
+            exact: self.exact,
+            ..WindowSettings::default()
+        })
     }
 }
 

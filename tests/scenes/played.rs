@@ -2,6 +2,7 @@
 
 use holodrive::encode::{EncodeSettings, Encoding};
 use holodrive::hologram::HologramSettings;
+use holodrive::names::Named;
 use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Packing, PanelProfile, SignalLayout};
 use holodrive::pipeline::{self, SceneSettings};

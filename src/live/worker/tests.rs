@@ -1,4 +1,5 @@
 use super::*;
+use crate::names::Named;
 use crate::panel::{Packing, SignalLayout};
 use std::time::Duration;
 

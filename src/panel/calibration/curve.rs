@@ -6,6 +6,7 @@
 //! (Levenberg & Marquardt), starting from the phases that the maxima and minima of the sweep tell.
 
 use crate::error::{Error, Result};
+use crate::names::{Name, Named};
 use crate::panel::vendor::text;
 use crate::panel::{Curve, Frame, PanelProfile};
 use std::f64::consts::{PI, TAU};
@@ -18,6 +19,14 @@ pub enum Order {
     Zero,
     /// A first order: dark where the levels agree.
     First,
+}
+
+impl Named for Order {
+    const KIND: &'static str = "order";
+    const NAMES: &'static [Name<Self>] = &[
+        ("first", || Self::First, "the detector saw a first order of the gratings"),
+        ("zero", || Self::Zero, "the detector saw the undiffracted light"),
+    ];
 }
 
 /// A fitted curve.

@@ -11,6 +11,7 @@ mod write;
 pub use read::{Read, read};
 pub use write::write;
 
+use crate::names::{Name, Named};
 use serde::{Deserialize, Serialize};
 
 /// In which frame the positions of a file stand.
@@ -22,6 +23,14 @@ pub enum Frame {
     Hologram,
     /// The scene's own metres, where the camera's rays put the points.
     World,
+}
+
+impl Named for Frame {
+    const KIND: &'static str = "frame";
+    const NAMES: &'static [Name<Self>] = &[
+        ("hologram", || Self::Hologram, "metres from the panel's middle: ready for a hologram"),
+        ("world", || Self::World, "the scene's own metres"),
+    ];
 }
 
 /// What our own files say of themselves, in one comment line.

@@ -1,7 +1,7 @@
 //! Flags of plates.
 
-use super::args::size;
-use super::scene_args::{FileArgs, White, white};
+use super::parse::{White, part, position, size, white};
+use super::scene::FileArgs;
 use clap::{Args, Subcommand, ValueEnum};
 use holodrive::units;
 use std::path::PathBuf;
@@ -74,7 +74,7 @@ pub(crate) struct PreviewArgs {
     /// The plate's folder.
     pub(crate) folder: PathBuf,
     /// Where the eye is: x,y,z (hologram frame, z in front of the plate).
-    #[arg(long, value_parser = super::args::position, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    #[arg(long, value_parser = position, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) eye: [f64; 3],
     /// Depth that it focuses on: +5mm in front of the plate, -5mm behind; without a sign the side of the scene.
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
@@ -139,16 +139,4 @@ pub(crate) struct ExportArgs {
     /// png, bmp of 8 bits: levels fall linearly over the overlap, so that two exposures add up to one.
     #[arg(long)]
     pub(crate) window: bool,
-}
-
-fn part(text: &str) -> Result<[u64; 4], String> {
-    let wrong = || format!("`{text}` is not COLUMN,ROW,WxH such as 0,4096,4096x4096");
-    let mut parts = text.splitn(3, ',');
-    let mut number = || parts.next().and_then(|t| t.trim().parse::<u64>().ok());
-    let (Some(column), Some(row)) = (number(), number()) else { return Err(wrong()) };
-    let (width, height) = parts.next().and_then(|t| t.split_once(['x', '×'])).ok_or_else(wrong)?;
-    match (width.trim().parse(), height.trim().parse()) {
-        (Ok(width), Ok(height)) => Ok([column, row, width, height]),
-        _ => Err(wrong()),
-    }
 }

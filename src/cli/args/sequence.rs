@@ -1,7 +1,8 @@
 //! Flags of frames in time.
 
-use super::args::size;
-use clap::{Args, ValueEnum};
+use super::parse::{Ahead, ahead, one_of, size};
+use clap::Args;
+use holodrive::sequence::RawFormat;
 use std::path::PathBuf;
 
 /// How frames in time are read and played.
@@ -28,8 +29,8 @@ pub(crate) struct SequenceArgs {
     #[arg(long, value_parser = size, value_name = "WxH")]
     pub(crate) raw: Option<(usize, usize)>,
     /// Pixels of raw video.
-    #[arg(long, value_enum, default_value_t = RawFormatArg::Gray, requires = "raw")]
-    pub(crate) raw_format: RawFormatArg,
+    #[arg(long, value_parser = one_of::<RawFormat>(), default_value = "gray", value_name = "FORMAT", requires = "raw")]
+    pub(crate) raw_format: RawFormat,
     /// Plane that the contact sheet of the simulated panel is focused on, from the panel, signed as reconstruct's --distance
     /// [default: the nearest object of a scene, the middle of the content's depth of prepared frames].
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
@@ -37,34 +38,4 @@ pub(crate) struct SequenceArgs {
     /// Write a line of JSON for each frame to this file (a pipe will do) as soon as the panel has settled on it.
     #[arg(long, value_name = "FILE")]
     pub(crate) events: Option<PathBuf>,
-}
-
-/// How many frames are made ahead.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Ahead {
-    Frames(usize),
-    All,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum RawFormatArg {
-    /// A byte: the drive level.
-    Gray,
-    /// Two bytes, the low one first: the drive level.
-    Gray16,
-    /// A bit, the first of eight in the high one: on or off.
-    Mono,
-    /// Red, green and blue: the video signal as it is.
-    Rgb,
-}
-
-fn ahead(text: &str) -> Result<Ahead, String> {
-    match text {
-        "all" => Ok(Ahead::All),
-        // Frames of a 4K panel take 25 MB each.
-        number => match number.parse() {
-            Ok(count) if (1..=1000).contains(&count) => Ok(Ahead::Frames(count)),
-            _ => Err(format!("`{text}` is not a number of frames from 1 to 1000, nor all")),
-        },
-    }
 }

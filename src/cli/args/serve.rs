@@ -1,18 +1,13 @@
 //! The flags of `serve`.
 
-use super::args::{PanelArgs, PresenterArg};
+use super::panel::PanelArgs;
+use super::parse::one_of;
 use clap::{Args, ValueEnum};
+#[cfg(feature = "display")]
+use holodrive::display::Presenter;
+use holodrive::serve::OnClientGone;
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
-
-/// What stays on the panel when a client goes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum OnClientGoneArg {
-    /// Its last frame.
-    Keep,
-    /// The idle frame.
-    Idle,
-}
 
 /// What slmsuite's levels are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -51,8 +46,8 @@ pub(crate) struct ServeArgs {
     pub(crate) idle: String,
     /// What stays on the panel when the client that showed the last frame goes. slmsuite's connect anew for each frame;
     /// theirs always stays.
-    #[arg(long, value_enum, default_value_t = OnClientGoneArg::Keep, value_name = "WHAT")]
-    pub(crate) on_client_gone: OnClientGoneArg,
+    #[arg(long, value_parser = one_of::<OnClientGone>(), default_value = "keep", value_name = "WHAT")]
+    pub(crate) on_client_gone: OnClientGone,
     /// What slmsuite's levels are: final, or calibrated here as phases.
     #[arg(long, value_enum, default_value_t = ServedLevelsArg::Final, value_name = "WHAT")]
     pub(crate) levels: ServedLevelsArg,
@@ -74,8 +69,9 @@ pub(crate) struct ServeArgs {
     #[arg(long)]
     pub(crate) allow_altered_levels: bool,
     /// What brings the levels to the screen.
-    #[arg(long, value_enum, default_value_t = PresenterArg::Auto)]
-    pub(crate) present: PresenterArg,
+    #[cfg(feature = "display")]
+    #[arg(long, value_parser = one_of::<Presenter>(), default_value = "auto", value_name = "NAME")]
+    pub(crate) present: Presenter,
     /// Write the Python module for the local protocol to this file, and serve nothing.
     #[arg(long, value_name = "FILE")]
     pub(crate) write_python: Option<PathBuf>,

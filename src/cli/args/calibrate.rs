@@ -1,0 +1,108 @@
+//! Flags of `calibrate`.
+
+use super::panel::PanelArgs;
+use super::parse::{one_of, size};
+use clap::{Args, Subcommand};
+use holodrive::panel::calibration::curve::Order;
+use holodrive::units;
+use std::path::PathBuf;
+
+/// What is calibrated.
+#[derive(Debug, Subcommand)]
+pub(crate) enum CalibrateCommand {
+    /// The level → phase curve: without --powers the gratings to show, with it the curve that the powers tell.
+    #[command(
+        after_help = "Examples:\n  holodrive calibrate curve --panel holoeye-pluto-2.1 --wavelength 532nm -o sweep\n  holodrive calibrate curve --panel holoeye-pluto-2.1 --wavelength 532nm --monitor HDMI-1 --hold 0.5 -o sweep\n  holodrive calibrate curve --panel holoeye-pluto-2.1 --wavelength 532nm --powers sweep/manifest.csv -o mine.toml\n\nThe sweep's folder holds the gratings and manifest.csv, a line for each, whose column `power` is for the power in the first order (or the zero order, --order zero). Powers may also come from any CSV with the columns level,power or level,column,row,power."
+    )]
+    Curve(CurveArgs),
+    /// The bend: without --interferograms or --zernike the phase steps to show, with one of them the correction.
+    #[command(
+        after_help = "Examples:\n  holodrive calibrate flatness --panel mine.toml --steps 4 -o steps\n  holodrive calibrate flatness --panel mine.toml --interferograms i0.png,i1.png,i2.png,i3.png -o flat.npy --into mine.toml\n  holodrive calibrate flatness --panel mine.toml --zernike 0,0,0,0.8,-0.1 --radius 6mm -o flat.png"
+    )]
+    Flatness(FlatnessArgs),
+    /// Test cards whose errors an eye sees.
+    #[command(
+        after_help = "Examples:\n  holodrive calibrate check --panel mine.toml -o cards\n  holodrive calibrate check --panel mine.toml --monitor HDMI-1 --hold 10 -o cards"
+    )]
+    Check(CheckArgs),
+}
+
+/// Where frames are shown beside being written.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ShownArgs {
+    /// Also show the frames one after another on this monitor (see `holodrive monitors`).
+    #[arg(long, value_name = "NAME")]
+    pub(crate) monitor: Option<String>,
+    /// How long each frame is shown, in seconds; not less than the panel takes to settle.
+    #[arg(long, default_value_t = 0.5, value_name = "SECONDS")]
+    pub(crate) hold: f64,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CurveArgs {
+    #[command(flatten)]
+    pub(crate) panel: PanelArgs,
+    /// Measured powers (.csv): find the curve.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) powers: Option<PathBuf>,
+    /// Folder for the gratings [default: sweep], or the profile to write [default: calibrated.toml].
+    #[arg(short, long, value_name = "PATH")]
+    pub(crate) output: Option<PathBuf>,
+    /// Order of the gratings that was measured.
+    #[arg(long, value_parser = one_of::<Order>(), default_value = "first", value_name = "ORDER")]
+    pub(crate) order: Order,
+    /// Number of levels in the sweep, evenly from the lowest to the highest [default: 64, or all of fewer].
+    #[arg(long, value_name = "N", conflicts_with = "powers")]
+    pub(crate) levels: Option<usize>,
+    /// Width of the gratings' stripes, in columns: several, against crosstalk.
+    #[arg(long, default_value_t = 8, value_name = "COLUMNS")]
+    pub(crate) stripe: usize,
+    /// Sweep this many regions of the panel one after another, side by side × one above the other.
+    #[arg(long, value_parser = size, value_name = "CxR", conflicts_with = "powers")]
+    pub(crate) regions: Option<(usize, usize)>,
+    /// Degree of the polynomial [default: the one that explains the powers best].
+    #[arg(long, value_name = "N")]
+    pub(crate) degree: Option<usize>,
+    #[command(flatten)]
+    pub(crate) shown: ShownArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct FlatnessArgs {
+    #[command(flatten)]
+    pub(crate) panel: PanelArgs,
+    /// Pictures of the panel's pixels in interference with a flat wave, one for each step, in their order: .png, .npy.
+    #[arg(long, value_name = "FILE,…", value_delimiter = ',', conflicts_with = "zernike")]
+    pub(crate) interferograms: Vec<PathBuf>,
+    /// Zernike coefficients of the panel's bend in waves, from piston on, in Noll's order and normalisation.
+    #[arg(long, value_name = "WAVES,…", value_delimiter = ',', allow_hyphen_values = true, requires = "radius")]
+    pub(crate) zernike: Vec<f64>,
+    /// Radius of the circle that the coefficients are for.
+    #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
+    pub(crate) radius: Option<f64>,
+    /// Number of phase steps to show.
+    #[arg(long, default_value_t = 4, value_name = "N")]
+    pub(crate) steps: usize,
+    /// Folder for the steps [default: steps], or the correction to write, .npy or .png [default: flatness.npy].
+    #[arg(short, long, value_name = "PATH")]
+    pub(crate) output: Option<PathBuf>,
+    /// Also write the panel's profile with this correction to this file.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) into: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) shown: ShownArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CheckArgs {
+    #[command(flatten)]
+    pub(crate) panel: PanelArgs,
+    /// Folder for the cards.
+    #[arg(short, long, default_value = "cards", value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Where the spots and letters are seen, in front of the panel.
+    #[arg(long, default_value = "200mm", value_parser = units::positive_length, value_name = "LENGTH")]
+    pub(crate) distance: f64,
+    #[command(flatten)]
+    pub(crate) shown: ShownArgs,
+}

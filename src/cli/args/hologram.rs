@@ -1,0 +1,26 @@
+//! Flags of how a field is computed.
+
+use super::parse::one_of;
+use clap::Args;
+use holodrive::hologram::Method;
+use holodrive::points::Channel;
+use holodrive::units;
+
+/// How the field is computed.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Hologram")]
+pub(crate) struct HologramArgs {
+    /// Engine that computes the field [default: the planner chooses].
+    #[arg(long, value_parser = one_of::<Method>(), value_name = "NAME")]
+    pub(crate) engine: Option<Method>,
+    /// Largest relative L2 error of the field.
+    #[arg(long, default_value_t = 1e-3, value_name = "ERROR")]
+    pub(crate) error: f64,
+    /// Memory that the computation of the field may take beside points and field; less means fewer or smaller tables,
+    /// and a refusal where no engine fits.
+    #[arg(long, default_value = "1GB", value_parser = units::memory, value_name = "SIZE")]
+    pub(crate) memory: u64,
+    /// Which light of a coloured cloud.
+    #[arg(long, value_parser = one_of::<Channel>(), default_value = "luminance", value_name = "NAME", conflicts_with = "wavelengths")]
+    pub(crate) channel: Channel,
+}

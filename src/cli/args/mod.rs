@@ -1,0 +1,127 @@
+//! Flags as they are typed. These files import only one another: what a command does with its flags is not known here.
+
+mod bench;
+mod calibrate;
+mod encoding;
+mod hologram;
+mod monitors;
+mod panel;
+mod parse;
+mod placement;
+mod print;
+mod scene;
+mod sequence;
+mod serve;
+mod show;
+mod steps;
+
+pub(crate) use bench::{BenchCommand, EncodingsArgs, IterationsArgs};
+pub(crate) use calibrate::{CalibrateCommand, CheckArgs, CurveArgs, FlatnessArgs, ShownArgs};
+pub(crate) use encoding::EncodingArgs;
+pub(crate) use hologram::HologramArgs;
+pub(crate) use monitors::{DoctorArgs, MonitorsArgs};
+pub(crate) use panel::{ColorArgs, PanelArgs};
+#[cfg(feature = "display")]
+pub(crate) use parse::Ahead;
+pub(crate) use parse::{Wavelengths, White};
+pub(crate) use placement::{PlacementArg, PlacementArgs};
+pub(crate) use print::{ExportArgs, ExportFormat, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs};
+pub(crate) use scene::{FileArgs, SceneArgs};
+pub(crate) use serve::{ServeArgs, ServedLevelsArg};
+pub(crate) use show::ShowArgs;
+pub(crate) use steps::{ComputeArgs, EncodeArgs, PointsArgs, PropagateArgs, ReconstructArgs};
+
+use clap::{CommandFactory, Parser, Subcommand};
+
+const EXIT_CODES: &str = "\
+Exit codes: 0 done; 2 wrong flags, bad input, or a file or display that refused (one line says what, where and what to do; \
+nothing is written under a final name); 130 interrupted.";
+
+/// From a glTF room to light on a panel: holograms for spatial light modulators.
+#[derive(Debug, Parser)]
+#[command(name = "holodrive", version, after_help = EXIT_CODES, max_term_width = 120)]
+pub(crate) struct Cli {
+    /// Print the report as JSON on standard output, for machines.
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// The whole grammar. For one release the old `--method` is a hidden name of `compute`'s `--engine`, as it is of
+/// `--encoding` elsewhere.
+pub(crate) fn command() -> clap::Command {
+    Cli::command().mut_subcommand("compute", |compute| compute.mut_arg("engine", |engine| engine.alias("method")))
+}
+
+/// The steps, one by one, and `show`, which does them all.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Light a scene and trace it into point sources.
+    #[command(
+        after_help = "Examples:\n  holodrive points scenes/cornell.gltf -o points.ply\n  holodrive points room.glb -o world.ply --frame world --picture traced.npy --rays 800x600\n  holodrive points room.glb --points 100000 -o points.ply"
+    )]
+    Points(PointsArgs),
+    /// Compute the field of a scene, point cloud, or picture with depth on the panel.
+    #[command(
+        after_help = "Examples:\n  holodrive compute points.ply -o field.npy\n  holodrive compute rgb.png+depth.png --panel holoeye-pluto-2.1 --wavelength 532nm -o field.npy\n  holodrive compute rgb.png+depth.png --layers 16 -o field.npy\n  holodrive compute near.png@100mm+far.png@150mm -o field.npy\n  holodrive compute points.ply --wavelengths 638nm,520nm,450nm -o field.npy"
+    )]
+    Compute(ComputeArgs),
+    /// Carry a field from its plane to another.
+    #[command(
+        after_help = "Example:\n  holodrive propagate field.npy --pitch 8um --wavelength 532nm --distance 0.5m -o out.npy"
+    )]
+    Propagate(PropagateArgs),
+    /// Encode a field, or a picture at depths, as a frame of drive levels for a panel.
+    #[command(
+        after_help = "Examples:\n  holodrive encode field.npy --encoding double-phase -o frame.png\n  holodrive encode field.npy --encoding double-phase --blaze 0.6deg --lens 300mm -o frame.png\n  holodrive encode picture.png --encoding weighted --depths 100mm -o frame.png\n  holodrive encode rgb.png+depth.png --encoding plane-gradient --depths 100mm,120mm,150mm -o frame.png"
+    )]
+    Encode(EncodeArgs),
+    /// Reconstruct what is seen of a frame or a field: on a plane, or through an eye.
+    #[command(
+        after_help = "Examples:\n  holodrive reconstruct frame.png --distance 120mm -o near.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus 150mm --pupil 4mm -o eye.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus 150mm --views 5x1 --eye-box 20mm -o eye.png"
+    )]
+    Reconstruct(ReconstructArgs),
+    /// The whole way: scene, points, field or frame → pictures on the simulated panel, or light on a real one.
+    #[command(
+        after_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show scenes/cornell.gltf --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive show frames/ --monitor HDMI-1 --fps 30 --loop\n  holodrive show walk.glb --fps 12\n  holodrive show room.glb --monitor HDMI-1 --live\n  ffmpeg -i levels.mkv -f rawvideo -pix_fmt gray - | holodrive show - --raw 1920x1080 --monitor HDMI-1 --fps 24"
+    )]
+    Show(Box<ShowArgs>),
+    /// Find a panel's curve and wavefront error: frames to show, and what the measured numbers say.
+    #[command(
+        after_help = "Examples:\n  holodrive calibrate curve -o sweep\n  holodrive calibrate curve --powers sweep/manifest.csv -o mine.toml\n  holodrive calibrate flatness --zernike 0,0,0,0.8 --radius 6mm -o flat.npy --into mine.toml\n  holodrive calibrate check --panel mine.toml -o cards"
+    )]
+    Calibrate {
+        /// What to find.
+        #[command(subcommand)]
+        what: CalibrateCommand,
+    },
+    /// Compare what this program offers, on the simulated panel.
+    #[command(
+        after_help = "Examples:\n  holodrive bench encodings\n  holodrive bench encodings --size 96x72 --iterations 20 --json"
+    )]
+    Bench {
+        /// What to compare.
+        #[command(subcommand)]
+        what: BenchCommand,
+    },
+    /// Print a hologram: fringes of a plate of any size, tile by tile into a file.
+    #[command(
+        after_help = "Examples:\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml --dry-run\n  holodrive print scenes/cornell.gltf --plate calib/plate-small.toml -o plate\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml -o plate --shard auto"
+    )]
+    Print(PrintArgs),
+    /// Keep a panel, and show on it what other programs send.
+    ///
+    /// Runs until Ctrl-C, or Esc on the panel. The first line says where clients come in (with --json: one line of JSON with
+    /// the ports that it got); the report comes at the end.
+    #[command(
+        after_help = "Examples:\n  holodrive serve --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive serve --panel generic --monitor none --slmsuite 0 --json\n  holodrive serve --panel mine.toml --monitor HDMI-1 --local --on-client-gone idle --idle flat.png\n  holodrive serve --write-python holodrive.py"
+    )]
+    Serve(ServeArgs),
+    /// List the monitors, and which panel profile fits each.
+    Monitors(MonitorsArgs),
+    /// Look at everything on this desktop that alters levels on their way to a panel.
+    #[command(after_help = "Examples:\n  holodrive doctor\n  holodrive doctor --monitor HDMI-1 --card card.png")]
+    Doctor(DoctorArgs),
+}

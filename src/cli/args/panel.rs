@@ -1,0 +1,27 @@
+//! Flags of the panel and of the light on it.
+
+use super::parse::{Wavelengths, wavelengths};
+use clap::Args;
+use holodrive::units;
+
+/// Which panel.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Panel")]
+pub(crate) struct PanelArgs {
+    /// Panel profile: a name from calib/ or a TOML file.
+    #[arg(long, default_value = "generic", value_name = "PROFILE")]
+    pub(crate) panel: String,
+    /// Vacuum wavelength, with its unit [default: the panel's first].
+    #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
+    pub(crate) wavelength: Option<f64>,
+}
+
+/// A hologram for each of three lasers.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Panel")]
+pub(crate) struct ColorArgs {
+    /// Colour: vacuum wavelengths of three lasers, or `panel` for those of its profile. One trace makes a hologram for
+    /// each; files are named -red, -green, -blue.
+    #[arg(long, value_parser = wavelengths, value_name = "RED,GREEN,BLUE", conflicts_with = "wavelength")]
+    pub(crate) wavelengths: Option<Wavelengths>,
+}

@@ -1,0 +1,47 @@
+//! Flags of where a scene stands before the panel.
+
+use super::parse::{White, one_of, white};
+use clap::{Args, ValueEnum};
+use holodrive::points::images::DepthScale;
+use holodrive::points::placement::Phase;
+use holodrive::units;
+
+/// Where the scene stands before the panel.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Placement")]
+pub(crate) struct PlacementArgs {
+    /// window: the camera's picture seen through the panel; model: the scene as a miniature.
+    #[arg(long, value_enum, default_value_t = PlacementArg::Window)]
+    pub(crate) placement: PlacementArg,
+    /// Distance of the viewer's eye in front of the panel.
+    #[arg(long, default_value = "600mm", value_parser = units::positive_length, value_name = "LENGTH")]
+    pub(crate) viewer: f64,
+    /// window: how far behind the panel the nearest point stands (negative: in front).
+    #[arg(long, default_value = "100mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) near: f64,
+    /// window: how far behind the panel the farthest point stands.
+    #[arg(long, default_value = "150mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) far: f64,
+    /// model: how far behind the panel the scene's middle stands (negative: in front).
+    #[arg(long, default_value = "150mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) distance: f64,
+    /// model: metres at the panel for one metre of the scene [default: fits the view].
+    #[arg(long, value_name = "FACTOR")]
+    pub(crate) scale: Option<f64>,
+    /// Initial phase of the points.
+    #[arg(long, value_parser = one_of::<Phase>(), default_value = "random", value_name = "PHASE")]
+    pub(crate) phase: Phase,
+    /// Clip light brighter than white, by its largest of red, green and blue: auto (a quarter above what 97 % of the lit
+    /// pixels do not pass), none, or a radiance [default: none for `points`, auto otherwise].
+    #[arg(long, value_parser = white, value_name = "WHITE")]
+    pub(crate) white: Option<White>,
+    /// Depth map of a picture: which end of its gray scale is near.
+    #[arg(long, value_parser = one_of::<DepthScale>(), default_value = "white-near", value_name = "SCALE")]
+    pub(crate) depth_scale: DepthScale,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PlacementArg {
+    Window,
+    Model,
+}
