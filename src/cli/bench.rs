@@ -9,7 +9,7 @@ use holodrive::field::{Complex32, Fft2};
 use holodrive::names::Named;
 use holodrive::panel::PanelProfile;
 use holodrive::{Error, Result, files};
-use std::path::PathBuf;
+use serde_json::json;
 use std::time::Instant;
 
 pub(super) fn bench(command: &BenchCommand) -> Result<Report> {
@@ -51,14 +51,12 @@ fn table(args: &EncodingsArgs) -> Result<Report> {
         }
     }
     let table = markdown(&rows);
+    report.section(json!({ "simulated": true, "size": [width, height], "iterations": args.iterations, "rows": rows }));
+    report.line(table.trim_end());
     if let Some(path) = &args.output {
         files::write_bytes(path, table.as_bytes())?;
-        report.add("output", path.display().to_string(), "");
+        report.output("table", path);
     }
-    report.add("simulated", true, "");
-    report.add("size", vec![width, height], "");
-    report.add("iterations", args.iterations, "");
-    report.add_serialised("rows", &rows, table.trim_end());
     Ok(report)
 }
 
@@ -118,22 +116,21 @@ fn iterations(args: &IterationsArgs) -> Result<Report> {
     }
     let iteration = (many - one) / args.iterations as f64;
     let share = iteration / pair / args.planes as f64;
-    report.add("size", vec![width, height], "");
-    report.add("planes", args.planes, "");
-    report.add("pair_seconds", pair, "");
-    report.add("iteration_seconds", iteration, "");
-    report.add("iterations_per_second", 1.0 / iteration, "");
-    report.add(
-        "pairs_per_plane",
-        share,
-        format!(
-            "{width} × {height}, {} planes: {:.2} iterations a second, {} each; a pair of transforms of twice the sides takes {}: \
-             {share:.2} pairs a plane",
-            args.planes,
-            1.0 / iteration,
-            seconds(iteration),
-            seconds(pair)
-        ),
-    );
+    report.section(json!({
+        "size": [width, height],
+        "planes": args.planes,
+        "pair_seconds": pair,
+        "iteration_seconds": iteration,
+        "iterations_per_second": 1.0 / iteration,
+        "pairs_per_plane": share,
+    }));
+    report.line(format!(
+        "{width} × {height}, {} planes: {:.2} iterations a second, {} each; a pair of transforms of twice the sides takes {}: \
+         {share:.2} pairs a plane",
+        args.planes,
+        1.0 / iteration,
+        seconds(iteration),
+        seconds(pair)
+    ));
     Ok(report)
 }

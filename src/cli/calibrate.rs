@@ -12,7 +12,7 @@ use holodrive::panel::calibration::{
 use holodrive::panel::{Curve, Frame, PanelProfile, Wavefront};
 use holodrive::progress::Progress;
 use holodrive::units::show_length;
-use holodrive::{Error, Result, files, units};
+use holodrive::{Error, Result, files};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

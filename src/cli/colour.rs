@@ -66,7 +66,7 @@ pub(super) fn compute(
                 let path = named(&args.output, NAMES[i]);
                 let content = content(&points.cloud, &points.metadata);
                 npy::write_field(&path, &computed.field, &content, &source(&args.input, points, lasers, i))?;
-                part.add("output", path.display().to_string(), format!("field        {}", path.display()));
+                part.output("field", &path);
             }
             None => part.add("dark", true, "dark         no light for this laser, no field"),
         }

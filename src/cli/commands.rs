@@ -50,7 +50,7 @@ pub(super) fn points(args: &PointsArgs) -> Result<Report> {
     bar.progress.check()?;
     if let Some(picture) = &args.picture {
         write_traced(picture, &lit)?;
-        report.add("picture", picture.display().to_string(), format!("picture      {}", picture.display()));
+        report.file("picture", "picture", picture);
     }
     if let Some(map) = &args.depth_map {
         let Placement::Window { near, far, .. } = placed_by(&args.placement) else {
@@ -61,10 +61,10 @@ pub(super) fn points(args: &PointsArgs) -> Result<Report> {
         };
         let size = [lit.view.width as u32, lit.view.height as u32];
         images::write_depths(map, size, &lit.view.depths, args.placement.depth_scale, [near, far])?;
-        report.add("depth_map", map.display().to_string(), format!("depth map    {}", map.display()));
+        report.file("depth_map", "depth map", map);
     }
     ply::write(&args.output, &cloud, &metadata)?;
-    report.add("output", args.output.display().to_string(), format!("points       {}", args.output.display()));
+    report.output("points", &args.output);
     Ok(report)
 }
 
@@ -127,7 +127,7 @@ pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
     bar.progress.check()?;
     let content = content(&points.cloud, &points.metadata);
     npy::write_field(&args.output, &computed.field, &content, &origin(&args.input, &points.cloud))?;
-    report.add("output", args.output.display().to_string(), format!("field        {}", args.output.display()));
+    report.output("field", &args.output);
     Ok(report)
 }
 
@@ -165,7 +165,7 @@ pub(super) fn propagate(args: &PropagateArgs) -> Result<Report> {
     report.add("memory", planned.memory(), "");
     report.add("energy_kept", out.energy() / field.energy(), "");
     report.add("seconds", elapsed, format!("propagated over {} in {}", show_length(args.distance), seconds(elapsed)));
-    report.add("output", args.output.display().to_string(), format!("field        {}", args.output.display()));
+    report.output("field", &args.output);
     Ok(report)
 }
 
@@ -257,7 +257,7 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
             seconds(elapsed)
         ),
     );
-    report.add("output", args.output.display().to_string(), format!("picture      {}", args.output.display()));
+    report.output("picture", &args.output);
     Ok(report)
 }
 

@@ -154,7 +154,7 @@ pub(super) fn encode(args: &EncodeArgs) -> Result<Report> {
     };
     bar.progress.check()?;
     frame.write(&args.output)?;
-    report.add("output", args.output.display().to_string(), format!("frame        {}", args.output.display()));
+    report.output("frame", &args.output);
     Ok(report)
 }
 

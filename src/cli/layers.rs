@@ -3,7 +3,7 @@
 use super::args::ComputeArgs;
 use super::colour::named;
 use super::load::{Input, Panel, placed_by};
-use super::report::{Report, seconds};
+use super::report::{Report, step};
 use holodrive::field::npy::{self, Content};
 use holodrive::hologram::layers::{self, SliceSettings};
 use holodrive::points::colour::NAMES;
@@ -13,6 +13,7 @@ use holodrive::points::slices::{Light, Slices};
 use holodrive::progress::Progress;
 use holodrive::units::show_length;
 use holodrive::{Error, Result};
+use serde_json::json;
 use std::time::Instant;
 
 /// Computes the layers of a picture with depth, or of a focal stack, and writes a field for each colour of light.
@@ -54,28 +55,22 @@ pub(super) fn compute(
         let (field, lit) = layers::of_slices(&slices, light, &panel.grid, wavelength, &settings, progress)?;
         let mut own = Report::new("compute");
         let part = if colored { &mut own } else { &mut *report };
-        part.add("wavelength", wavelength, "");
-        part.add("method", "layers", "");
-        part.add("layers", slices.depths().len(), "");
-        part.add("samples", lit, "");
-        let (first, last) = (slices.depths()[0], slices.depths()[slices.depths().len() - 1]);
+        let depths = slices.depths();
         let spent = begin.elapsed().as_secs_f64();
-        let planes =
-            if slices.depths().len() == 1 { "1 plane".into() } else { format!("{} planes", slices.depths().len()) };
-        let line = format!(
-            "field        {:>8}  layers: {planes}, z {} … {}, {lit} lit samples of {}×{}",
-            seconds(spent),
-            show_length(first),
-            show_length(last),
-            slices.lattice.width,
-            slices.lattice.height
-        );
-        part.add("field_seconds", spent, line);
+        part.section(json!({
+            "method": "layers", "layers": depths.len(), "samples": lit, "wavelength": wavelength, "field_seconds": spent,
+        }));
+        let (first, last) = (depths[0], depths[depths.len() - 1]);
+        let planes = if depths.len() == 1 { "1 plane".into() } else { format!("{} planes", depths.len()) };
+        let (near, far) = (show_length(first), show_length(last));
+        let grid = (slices.lattice.width, slices.lattice.height);
+        let what = format!("layers: {planes}, z {near} … {far}, {lit} lit samples of {}×{}", grid.0, grid.1);
+        part.line(step("field", spent, what));
         let path = if colored { named(&args.output, NAMES[i]) } else { args.output.clone() };
         let content = Content { z: 0.0, depth: Some([first, last]), eye: None, window: None };
-        let origin = format!("{} layers of {}", slices.depths().len(), args.input.display());
+        let origin = format!("{} layers of {}", depths.len(), args.input.display());
         npy::write_field(&path, &field, &content, &origin)?;
-        part.add("output", path.display().to_string(), format!("field        {}", path.display()));
+        part.output("field", &path);
         if colored {
             report.add_part(NAMES[i], format!("{:<12} {}", NAMES[i], show_length(wavelength)), own);
         }

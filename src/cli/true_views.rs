@@ -55,6 +55,6 @@ pub(super) fn compute(
         npy::Content { depth: Some(seen.depths), eye: Some([0.0, 0.0, views.viewer]), ..npy::Content::default() };
     let origin = format!("true views of {}", args.input.display());
     npy::write_field(&args.output, &seen.field, &content, &origin)?;
-    report.add("output", args.output.display().to_string(), format!("field        {}", args.output.display()));
+    report.output("field", &args.output);
     Ok(())
 }
