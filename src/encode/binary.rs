@@ -6,7 +6,8 @@
 //! orders, an exact mean. *Direct search*: pixels of the thresholded fringe are turned over while that lowers the error of
 //! the field within the band (Seldowitz, Allebach & Sweeney, *Applied Optics* 26, 2788 (1987)).
 
-use super::off_axis::{self, Fringe, OffAxis};
+use super::fringe::{Fringe, Quantity};
+use super::off_axis::{self, OffAxis, OffAxisKind};
 use super::{EncodedPattern, amplitude_at, band, error_diffusion};
 use crate::error::Result;
 use crate::field::{Complex32, Field};
@@ -61,35 +62,25 @@ impl Binarisation {
 }
 
 pub(super) fn pattern(field: &Field, settings: &BinaryFringe, progress: &Progress) -> Result<EncodedPattern> {
-    let made = off_axis::pattern(field, &settings.fringe, Fringe::Bipolar, progress)?;
+    let made = off_axis::pattern(field, &settings.fringe, OffAxisKind::Bipolar, progress)?;
     let EncodedPattern { pattern, record, target, clipped, dropped, warnings } = made;
     let (grid, wavelength) = (field.grid, field.wavelength);
     let EncodingRecord { mut parameters, illumination, aperture, .. } = record;
     let greatest = amplitude_at(&target, settings.fringe.percentile)?;
     let mut reference = vec![Complex32::new(1.0, 0.0); grid.len()];
     illuminate(&mut reference, grid, wavelength, illumination)?;
-    let threshold = || -> Vec<f32> {
-        let open = |(u, r): (&Complex32, &Complex32)| {
-            let width = (u.norm() / greatest).min(1.0).asin();
-            let phase = u * r.conj();
-            if phase.im.atan2(phase.re).abs() < width { 1.0 } else { 0.0 }
-        };
-        target.samples.par_iter().zip(&reference).map(open).collect()
-    };
+    let fringe = Fringe::new(Quantity::Bipolar, greatest, 1.0);
+    let threshold = || target.samples.par_iter().zip(&reference).map(|(&u, &r)| fringe.pulse(u, r)).collect();
     let (open, scale) = match settings.method {
         Binarisation::Threshold => (threshold(), 1.0 / (PI * greatest)),
         Binarisation::ErrorDiffusion => {
-            let mut wishes = pattern.values().to_vec();
-            let mut open = vec![0.0; wishes.len()];
-            error_diffusion::diffuse(&mut wishes, grid.width, true, |i, wish: f32| {
-                open[i] = if wish > 0.5 { 1.0 } else { 0.0 };
-                wish - open[i]
-            });
+            let mut open = pattern.values().to_vec();
+            error_diffusion::binarise(&mut open, grid.width);
             (open, 0.25 / greatest)
         }
         Binarisation::DirectSearch { sweeps } => {
             parameters.insert("sweeps".into(), json!(sweeps));
-            let mut open = threshold();
+            let mut open: Vec<f32> = threshold();
             if let Some(aperture) = &aperture {
                 search(&mut open, &target, &reference, aperture, sweeps, progress)?;
             }

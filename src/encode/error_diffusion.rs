@@ -83,9 +83,19 @@ pub(super) fn pattern(
     Ok(EncodedPattern { pattern, record, target, clipped, dropped, warnings: band::lost(dropped) })
 }
 
+/// Turns values between 0 and 1 into 0 or 1 by serpentine error diffusion.
+pub(crate) fn binarise(values: &mut [f32], width: usize) {
+    let mut open = vec![0.0; values.len()];
+    diffuse(values, width, true, |i, wish: f32| {
+        open[i] = if wish > 0.5 { 1.0 } else { 0.0 };
+        wish - open[i]
+    });
+    values.copy_from_slice(&open);
+}
+
 /// Runs over rows; `show(i, wish)` returns the error that pixel i leaves, which its neighbours share as 7, 3, 5 and 1
 /// sixteenths: ahead, below behind, below, below ahead. What would leave the picture is dropped.
-pub(crate) fn diffuse<T>(wishes: &mut [T], width: usize, serpentine: bool, mut show: impl FnMut(usize, T) -> T)
+fn diffuse<T>(wishes: &mut [T], width: usize, serpentine: bool, mut show: impl FnMut(usize, T) -> T)
 where
     T: Copy + std::ops::Mul<f32, Output = T> + std::ops::AddAssign,
 {

@@ -29,6 +29,7 @@ pub mod binary;
 pub mod cells;
 pub mod double_phase;
 pub mod error_diffusion;
+pub mod fringe;
 mod iterated;
 pub mod iterative;
 pub mod kinoform;
@@ -39,6 +40,7 @@ pub use binary::{Binarisation, BinaryFringe};
 pub use cells::{Cell, CellHologram};
 pub use double_phase::{DoublePhase, Interlace};
 pub use error_diffusion::ErrorDiffusion;
+pub use fringe::Quantity;
 pub use iterated::{BandGradient, PlaneEncoding, PlaneMethod, PlaneStart};
 pub use off_axis::{OffAxis, Reference};
 
@@ -369,7 +371,7 @@ fn straight_pattern(
     (profile, illumination, incident): (&PanelProfile, Illumination, &[Complex32]),
     progress: &Progress,
 ) -> Result<EncodedPattern> {
-    use off_axis::Fringe;
+    use off_axis::OffAxisKind;
     if let Some(i) = field.samples.iter().position(|u| !u.is_finite()) {
         let (column, row) = (i % field.grid.width, i / field.grid.width);
         return Err(Error::parameter("field", format!("the sample at column {column}, row {row} is not finite")));
@@ -381,9 +383,9 @@ fn straight_pattern(
     let mut made = match encoding {
         Encoding::DoublePhase(settings) => double_phase::pattern(field, settings, progress),
         Encoding::Kinoform => kinoform::pattern(field),
-        Encoding::OffAxisBipolar(settings) => off_axis::pattern(field, settings, Fringe::Bipolar, progress),
-        Encoding::OffAxisIntensity(settings) => off_axis::pattern(field, settings, Fringe::Intensity, progress),
-        Encoding::SingleSideBand(settings) => off_axis::pattern(field, settings, Fringe::SingleSideBand, progress),
+        Encoding::OffAxisBipolar(settings) => off_axis::pattern(field, settings, OffAxisKind::Bipolar, progress),
+        Encoding::OffAxisIntensity(settings) => off_axis::pattern(field, settings, OffAxisKind::Intensity, progress),
+        Encoding::SingleSideBand(settings) => off_axis::pattern(field, settings, OffAxisKind::SingleSideBand, progress),
         Encoding::ErrorDiffusion(settings) => {
             let curve = profile.drive_curve(field.wavelength)?.0;
             return error_diffusion::pattern(field, settings, &curve, incident, progress);
@@ -454,9 +456,8 @@ fn amplitude_at(field: &Field, percentile: f64) -> Result<f32> {
         return Err(Error::parameter("percentile", format!("{percentile} must be above 0 and at most 1")));
     }
     let mut intensity = field.intensity();
-    let rank = ((intensity.len() as f64 * percentile).ceil() as usize).clamp(1, intensity.len()) - 1;
-    let (_, value, _) = intensity.select_nth_unstable_by(rank, f32::total_cmp);
-    let value = value.sqrt();
+    let rank = ((intensity.len() as f64 * percentile).ceil() as usize).max(1) - 1;
+    let value = fringe::order_statistic(&mut intensity, rank).sqrt();
     // More than the given share may be dark: then the greatest amplitude is the only scale there is.
     if value > 0.0 { Ok(value) } else { Ok(intensity.iter().fold(0.0, |a: f32, &b| a.max(b)).sqrt()) }
 }

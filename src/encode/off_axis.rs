@@ -16,6 +16,7 @@
 //! whose |u|² is 2b wide), and f_r + b < the limit (or the conjugate's replica reaches the object). One axis decides:
 //! the one with the larger share of the limit as carrier. Along the other the object keeps the panel's whole band.
 
+use super::fringe::{self, Fringe, Quantity};
 use super::{EncodedPattern, amplitude_at, band};
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Field};
@@ -67,7 +68,15 @@ impl Default for OffAxis {
     }
 }
 
-impl Fringe {
+/// The kinds of off-axis fringe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum OffAxisKind {
+    Bipolar,
+    Intensity,
+    SingleSideBand,
+}
+
+impl OffAxisKind {
     fn name(self) -> &'static str {
         match self {
             Self::Bipolar => "off-axis-bipolar",
@@ -75,18 +84,14 @@ impl Fringe {
             Self::SingleSideBand => "single-side-band",
         }
     }
-}
 
-/// The kinds of fringe.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Fringe {
-    Bipolar,
-    Intensity,
-    SingleSideBand,
+    fn quantity(self) -> Quantity {
+        if self == Self::Intensity { Quantity::Intensity } else { Quantity::Bipolar }
+    }
 }
 
 /// Carrier and band that keep the orders apart on a grid.
-struct Layout {
+struct CarrierBand {
     carrier: [f64; 2],
     band: Aperture,
     warnings: Vec<String>,
@@ -98,21 +103,19 @@ const LEAST_BAND: f64 = 0.125;
 /// Share of the room between the orders that the object gets: a finite panel's zero order is a little wide itself.
 const GUARD: f64 = 0.95;
 
-fn layout(field: &Field, settings: &OffAxis, fringe: Fringe) -> Result<Layout> {
+fn carrier_band(field: &Field, settings: &OffAxis, kind: OffAxisKind) -> Result<CarrierBand> {
     let grid = field.grid;
     let limits = [grid.limit_x(), grid.limit_y()];
-    if fringe == Fringe::SingleSideBand {
+    if kind == OffAxisKind::SingleSideBand {
         if settings.reference.is_some() || settings.bandwidth.is_some() {
             let what = "a single side band has its reference on the axis and half the panel's band; leave it out";
             return Err(Error::parameter("reference", what));
         }
-        let middle = [0.0, 0.5 * limits[1]];
+        let center = [0.0, 0.5 * limits[1]];
         let half = [limits[0] * settings.across * (1.0 + 1e-9), GUARD * 0.5 * limits[1]];
-        return Ok(Layout { carrier: [0.0; 2], band: Aperture { center: middle, half, stop: 0.0 }, warnings: vec![] });
+        return Ok(CarrierBand { carrier: [0.0; 2], band: Aperture { center, half, stop: 0.0 }, warnings: vec![] });
     }
-    let pitches = [grid.pitch_x, grid.pitch_y];
-    // Half widths of the object that fit between carrier and zero order.
-    let separation = if fringe == Fringe::Intensity { 3.0 } else { 1.0 };
+    let separation = kind.quantity().separation().unwrap_or(1.0);
     let carrier = match settings.reference {
         Some(reference) => reference.frequency(field.wavelength),
         None => [limits[0] * separation / (1.0 + separation), 0.0],
@@ -121,74 +124,50 @@ fn layout(field: &Field, settings: &OffAxis, fringe: Fringe) -> Result<Layout> {
         let what = format!("{carrier:?} cycles/m is no propagating wave at {} m", field.wavelength);
         return Err(Error::parameter("reference", what));
     }
-    let too_steep = |axis: usize, frequency: f64, hint: String| Error::Undersampled {
-        what: "reference wave and object",
-        frequency,
-        limit: limits[axis],
-        pitch: pitches[axis],
-        hint,
-    };
-    let steepest = |axis: usize| {
-        let angle = ((1.0 - LEAST_BAND) * limits[axis] * field.wavelength).min(1.0).asin().to_degrees();
-        format!("take a reference angle below {angle:.3} deg")
-    };
-    for axis in 0..2 {
-        if carrier[axis].abs() > limits[axis] {
-            return Err(too_steep(axis, carrier[axis].abs(), steepest(axis)));
-        }
+    let (carriers, axis) = fringe::carriers(carrier, &grid, field.wavelength);
+    for carrier in &carriers {
+        carrier.below_limit(0.0)?;
     }
-    let share = [carrier[0].abs() / limits[0], carrier[1].abs() / limits[1]];
-    let axis = usize::from(share[1] > share[0]);
-    let (along, limit) = (carrier[axis].abs(), limits[axis]);
+    let (along, limit) = (carriers[axis], limits[axis]);
     let mut warnings = Vec::new();
     let half = match settings.bandwidth {
         Some(bandwidth) => {
             if !(bandwidth > 0.0 && bandwidth.is_finite()) {
-                return Err(Error::parameter("bandwidth", format!("{bandwidth} cycles/m must be greater than zero")));
+                let value = format!("{bandwidth} cycles/m");
+                return Err(Error::out_of_range("bandwidth", value, "must be greater than zero"));
             }
-            if along + bandwidth > limit * (1.0 + 1e-9) {
-                let most = limit - along;
+            let frequency = along.highest + bandwidth;
+            if frequency > limit * (1.0 + 1e-9) {
+                let most = limit - along.highest;
                 let hint = format!("lower the carrier, or limit the object to {most:.4e} cycles/m");
-                return Err(too_steep(axis, along + bandwidth, hint));
+                return Err(along.undersampled(frequency, hint));
             }
-            if bandwidth * separation > along * (1.0 + 1e-9) {
+            if bandwidth * separation > along.lowest * (1.0 + 1e-9) {
                 warnings.push(format!(
-                    "carrier {along:.4e} cycles/m below {separation} × bandwidth {bandwidth:.4e}: the zero order overlaps the object"
+                    "carrier {:.4e} cycles/m below {separation} × bandwidth {bandwidth:.4e}: the zero order overlaps the object",
+                    along.lowest
                 ));
             }
             bandwidth
         }
-        None => {
-            let least = LEAST_BAND * limit;
-            if limit - along < least {
-                return Err(too_steep(axis, along + least, steepest(axis)));
-            }
-            if along < separation * least {
-                let what = format!(
-                    "carrier {along:.4e} cycles/m leaves the object in the zero order; take at least {:.4e}",
-                    separation * least
-                );
-                return Err(Error::parameter("reference", what));
-            }
-            GUARD * (limit - along).min(along / separation)
-        }
+        None => GUARD * along.below_limit(LEAST_BAND)?.min(along.beside_zero_order(separation, LEAST_BAND)?),
     };
     let mut share = [settings.across; 2];
     share[axis] = half / limit;
-    Ok(Layout { carrier, band: band::of_share(field, share)?, warnings })
+    Ok(CarrierBand { carrier, band: band::of_share(field, share)?, warnings })
 }
 
 pub(super) fn pattern(
     field: &Field,
     settings: &OffAxis,
-    fringe: Fringe,
+    kind: OffAxisKind,
     progress: &Progress,
 ) -> Result<EncodedPattern> {
     let ratio = settings.reference_ratio;
     if !(ratio > 0.0 && ratio.is_finite()) {
-        return Err(Error::parameter("reference_ratio", format!("{ratio} must be greater than zero")));
+        return Err(Error::out_of_range("reference_ratio", ratio, "must be greater than zero"));
     }
-    let Layout { carrier, band: aperture, mut warnings } = layout(field, settings, fringe)?;
+    let CarrierBand { carrier, band: aperture, mut warnings } = carrier_band(field, settings, kind)?;
     let (target, dropped) = band::limit(field, &aperture, progress)?;
     progress.advance(1);
     progress.check()?;
@@ -203,24 +182,18 @@ pub(super) fn pattern(
     let illumination = Illumination::Plane { frequency: carrier };
     let mut reference = vec![Complex32::new(1.0, 0.0); target.samples.len()];
     illuminate(&mut reference, field.grid, field.wavelength, illumination)?;
-    let (brightest, scale) = match fringe {
-        Fringe::Bipolar | Fringe::SingleSideBand => (amplitude, 0.25 / f64::from(amplitude)),
-        Fringe::Intensity => {
+    let fringe = Fringe::new(kind.quantity(), amplitude, ratio);
+    let scale = match kind {
+        OffAxisKind::Bipolar | OffAxisKind::SingleSideBand => 0.25 / f64::from(amplitude),
+        OffAxisKind::Intensity => {
             let rho = f64::from(amplitude) * ratio;
-            let brightest = (f64::from(amplitude) + rho).powi(2);
-            (brightest as f32, rho / brightest)
+            rho / (f64::from(amplitude) + rho).powi(2)
         }
     };
-    let rho = amplitude * ratio as f32;
-    let raw = |u: &Complex32, r: &Complex32| match fringe {
-        Fringe::Bipolar | Fringe::SingleSideBand => 0.5 + 0.5 * (u * r.conj()).re / brightest,
-        Fringe::Intensity => (u + r * rho).norm_sqr() / brightest,
-    };
-    let transmittance = target.samples.par_iter().zip(&reference).map(|(u, r)| raw(u, r).clamp(0.0, 1.0)).collect();
-    let outside = target.samples.par_iter().zip(&reference).filter(|(u, r)| {
-        // A value on the border up to rounding is not clipped.
-        !(-1e-6..=1.0 + 1e-6).contains(&raw(u, r))
-    });
+    let samples = target.samples.par_iter().zip(&reference);
+    let transmittance = samples.clone().map(|(&u, &r)| fringe.value(u, r).clamp(0.0, 1.0)).collect();
+    // A value on the border up to rounding is not clipped.
+    let outside = samples.filter(|&(&u, &r)| !(-1e-6..=1.0 + 1e-6).contains(&fringe.value(u, r)));
     let clipped = outside.count() as f64 / reference.len() as f64;
     progress.advance(1);
     let mut parameters = BTreeMap::from([
@@ -228,11 +201,11 @@ pub(super) fn pattern(
         ("percentile".to_owned(), json!(settings.percentile)),
         ("amplitude".to_owned(), json!(amplitude)),
     ]);
-    if fringe == Fringe::Intensity {
+    if kind == OffAxisKind::Intensity {
         parameters.insert("reference_ratio".to_owned(), json!(ratio));
     }
     let record = EncodingRecord {
-        method: fringe.name().into(),
+        method: kind.name().into(),
         modulation: Modulation::Amplitude,
         parameters,
         illumination,

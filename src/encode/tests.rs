@@ -232,7 +232,7 @@ fn a_reference_that_aliases_is_refused_with_its_numbers() {
     }
     let wide = OffAxis { reference: angle(1.0), bandwidth: Some(4e4), ..OffAxis::default() };
     assert!(matches!(with(wide), Err(Error::Undersampled { .. })));
-    assert!(matches!(with(OffAxis { reference: angle(0.01), ..OffAxis::default() }), Err(Error::Parameter { .. })));
+    assert!(matches!(with(OffAxis { reference: angle(0.01), ..OffAxis::default() }), Err(Error::OutOfRange { .. })));
     assert!(matches!(with(OffAxis { reference: angle(90.0), ..OffAxis::default() }), Err(Error::Parameter { .. })));
     let overlapping = OffAxis { reference: angle(0.5), bandwidth: Some(3e4), ..OffAxis::default() };
     assert!(with(overlapping).expect("overlap").report.warnings.iter().any(|w| w.contains("overlaps")));

@@ -16,17 +16,17 @@
 //! halo to the left, to the right and above the tile, whose pixels are the same fringe, so that it has settled at the edge.
 
 use super::geometry::{Piece, Rect, border, fringe_area, pieces, plate_from_file, tile_in_file, tile_on_plate};
-use super::plate::{Binarisation, Plate, Polarity, Quantity};
+use super::plate::{Binarisation, Plate, Polarity};
 use super::reference::Band;
 use super::slit::Strip;
 use super::views::Source;
-use crate::encode::error_diffusion::diffuse;
+use crate::encode::error_diffusion::binarise;
+use crate::encode::fringe::Fringe;
 use crate::error::Result;
 use crate::field::{Complex32, Grid};
 use crate::hologram::{self, Cull, HologramSettings, InstructionSet, Method};
 use crate::progress::Progress;
 use rayon::prelude::*;
-use std::f32::consts::PI;
 use std::ops::AddAssign;
 use std::time::Instant;
 
@@ -163,22 +163,9 @@ impl Maker<'_> {
     /// The fringe's transmittance on a rectangle, 0 to 1, for a field whose full swing is `amplitude`.
     pub(super) fn fringe(&self, field: &[Complex32], rect: &Rect, amplitude: f32) -> Vec<f32> {
         let plate = self.plate;
-        let (bias, contrast) = (plate.bias as f32, plate.contrast as f32);
-        let rho = amplitude * plate.reference_ratio as f32;
-        let brightest = (amplitude + rho).powi(2);
-        let open_only = plate.bits == 1 && plate.binarisation == Binarisation::PulseWidth;
-        let value = |u: Complex32, r: Complex32| -> f32 {
-            let product = u * r.conj();
-            if open_only {
-                let width = (u.norm() / amplitude).min(1.0).asin();
-                return if product.im.atan2(product.re).abs() < width { 1.0 } else { 0.0 };
-            }
-            match plate.quantity {
-                Quantity::Bipolar => bias + 0.5 * contrast * product.re / amplitude,
-                Quantity::Intensity => bias - 0.5 + contrast * (u + r * rho).norm_sqr() / brightest,
-                Quantity::Phase => product.im.atan2(product.re) / (2.0 * PI) + 0.5,
-            }
-        };
+        let fringe = Fringe::new(plate.quantity, amplitude, plate.reference_ratio)
+            .with_swing(plate.bias as f32, plate.contrast as f32);
+        let pulses = plate.bits == 1 && plate.binarisation == Binarisation::PulseWidth;
         let mut out = vec![0.0; rect.area()];
         out.par_chunks_mut(rect.width()).zip(field.par_chunks(rect.width())).enumerate().for_each_init(
             Vec::new,
@@ -186,7 +173,7 @@ impl Maker<'_> {
                 let row = rect.y[0] + i as i64;
                 plate.reference.row(plate, plate.wavelength_of(row), row, rect.x[0]..rect.x[1], reference);
                 for ((t, &u), &r) in out.iter_mut().zip(field).zip(reference.iter()) {
-                    let value = value(u, r).clamp(0.0, 1.0);
+                    let value = if pulses { fringe.pulse(u, r) } else { fringe.value(u, r).clamp(0.0, 1.0) };
                     *t = if plate.polarity == Polarity::Negative { 1.0 - value } else { value };
                 }
             },
@@ -197,8 +184,10 @@ impl Maker<'_> {
     /// The same after binarisation, where the plate has one bit.
     pub(super) fn levels(&self, field: &[Complex32], rect: &Rect, amplitude: f32) -> Vec<f32> {
         let mut levels = self.fringe(field, rect, amplitude);
-        if self.plate.bits == 1 {
-            binarise(&mut levels, rect.width(), self.plate.binarisation);
+        match self.plate.binarisation {
+            _ if self.plate.bits != 1 => {}
+            Binarisation::Diffusion => binarise(&mut levels, rect.width()),
+            _ => levels.iter_mut().for_each(|t| *t = if *t > 0.5 { 1.0 } else { 0.0 }),
         }
         levels
     }
@@ -255,26 +244,4 @@ impl Maker<'_> {
         }
         Ok((levels, work))
     }
-}
-
-/// Turns wishes between 0 and 1 into 0 or 1.
-fn binarise(wishes: &mut [f32], width: usize, how: Binarisation) {
-    if how != Binarisation::Diffusion {
-        wishes.iter_mut().for_each(|t| *t = if *t > 0.5 { 1.0 } else { 0.0 });
-        return;
-    }
-    let mut open = vec![0.0; wishes.len()];
-    diffuse(wishes, width, true, |i, wish: f32| {
-        open[i] = if wish > 0.5 { 1.0 } else { 0.0 };
-        wish - open[i]
-    });
-    wishes.copy_from_slice(&open);
-}
-
-/// Amplitude below which a share of the samples lies.
-pub(super) fn amplitude_at(samples: &[f32], share: f64) -> f32 {
-    let mut sorted = samples.to_vec();
-    sorted.sort_by(f32::total_cmp);
-    let last = sorted.len().saturating_sub(1);
-    sorted.get((last as f64 * share).round() as usize).copied().unwrap_or(0.0)
 }

@@ -1,11 +1,12 @@
 //! What a plate will take, and every reason why it would be wrong: found on a few small fields before the work.
 
-use super::fringe::{Maker, Work, amplitude_at};
+use super::fringe::{Maker, Work};
 use super::geometry::{Piece, Rect, file_size, fringe_area, tile_counts};
 use super::plate::{Binarisation, Quantity};
 use super::reference::{Band, Reference};
 use super::tiff::{Layout, resolution};
 use super::views::Source;
+use crate::encode::fringe::order_statistic;
 use crate::error::{Error, Result};
 use crate::field::Complex32;
 use crate::progress::Progress;
@@ -148,7 +149,8 @@ pub fn sample(maker: &Maker, progress: &Progress) -> Result<Sample> {
         maker.levels(&field, &rect, 1.0);
         sample.whole.fringe_seconds = begin.elapsed().as_secs_f64();
     }
-    let amplitude = amplitude_at(&samples, plate.percentile);
+    let rank = (samples.len().saturating_sub(1) as f64 * plate.percentile).round() as usize;
+    let amplitude = order_statistic(&mut samples, rank);
     // Four digits, so that the manifest's decimals are the very number that is used.
     let amplitude: f32 = format!("{amplitude:.3e}").parse().unwrap_or(amplitude);
     if !(amplitude > 0.0 && amplitude.is_finite()) {

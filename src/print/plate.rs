@@ -2,25 +2,13 @@
 
 use super::reference::{Reference, Side};
 use super::slit::Slit;
+pub use crate::encode::Quantity;
 use crate::error::{Error, Result};
 use crate::points::colour::Lasers;
 use crate::units;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
-
-/// What a pixel of the plate stands for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Quantity {
-    /// The interference term alone, ½ + ½·Re(u·r*)/A: no light scattered by the object with itself.
-    #[default]
-    Bipolar,
-    /// |u + ρ·r|², as a photographic plate records it.
-    Intensity,
-    /// The phase of u·r*, for plates whose relief or index follows the level.
-    Phase,
-}
 
 /// How a fringe becomes one bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -5,7 +5,8 @@
 //! along the carrier's axis and the object's half band b the three lie apart where b ≤ f_r (bipolar), b ≤ f_r/3
 //! (intensity, whose |u|² is 2b wide), and f_r + b stays below the plate's limit 1/(2·pitch).
 
-use super::plate::{Plate, Quantity};
+use super::plate::Plate;
+use crate::encode::fringe::{Carrier, deciding};
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Complex64};
 use serde::{Deserialize, Serialize};
@@ -127,7 +128,7 @@ impl Band {
     /// The widest band for a plate, in whole parts of its limit.
     ///
     /// # Errors
-    /// [`Error::Undersampled`] with the numbers where reference and object alias, [`Error::Parameter`] where the zero order
+    /// [`Error::Undersampled`] with the numbers where reference and object alias, [`Error::OutOfRange`] where the zero order
     /// would lie on the object.
     pub fn of(plate: &Plate) -> Result<Self> {
         let limit = [0.5 / plate.pitch_x, 0.5 / plate.pitch_y];
@@ -139,40 +140,16 @@ impl Band {
             let what = format!("{highest:?} cycles/m is no wave of {shortest} m that travels");
             return Err(Error::parameter("reference", what));
         }
+        let carriers = [0, 1].map(|axis| {
+            let [low, high] = ranges[axis];
+            let lowest = if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()) };
+            Carrier { lowest, highest: highest[axis], pitch: pitch[axis], wavelength: shortest }
+        });
         // What the reference leaves beside it below the limit.
-        let mut room = [limit[0] - highest[0], limit[1] - highest[1]];
-        for axis in 0..2 {
-            let least = NARROWEST * limit[axis];
-            if room[axis] < least {
-                let most = ((limit[axis] - least) * shortest).min(1.0).asin().to_degrees();
-                return Err(Error::Undersampled {
-                    what: "reference wave and object",
-                    frequency: highest[axis] + least,
-                    limit: limit[axis],
-                    pitch: pitch[axis],
-                    hint: format!("take a reference angle below {most:.2} deg, or a finer pitch"),
-                });
-            }
-        }
-        // A phase plate has neither conjugate nor self-interference to keep off.
-        let separation = match plate.quantity {
-            Quantity::Bipolar => Some(1.0),
-            Quantity::Intensity => Some(3.0),
-            Quantity::Phase => None,
-        };
-        if let Some(separation) = separation {
-            let lowest =
-                ranges.map(|[low, high]| if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()) });
-            let share = [lowest[0] / limit[0], lowest[1] / limit[1]];
-            let axis = usize::from(share[1] > share[0]);
-            room[axis] = room[axis].min(lowest[axis] / separation);
-            if room[axis] < NARROWEST * limit[axis] {
-                let least = (separation * NARROWEST * limit[axis] * plate.wavelength).min(1.0).asin().to_degrees();
-                let what = format!(
-                    "its angle is too small: the zero order lies on the object; at least {least:.2} deg along one axis"
-                );
-                return Err(Error::parameter("reference", what));
-            }
+        let mut room = [carriers[0].below_limit(NARROWEST)?, carriers[1].below_limit(NARROWEST)?];
+        if let Some(separation) = plate.quantity.separation() {
+            let axis = deciding(&carriers);
+            room[axis] = room[axis].min(carriers[axis].beside_zero_order(separation, NARROWEST)?);
         }
         let mut divisor = [1; 2];
         let to_slit = plate.slit.as_ref().map(|slit| slit.steepest(plate));
