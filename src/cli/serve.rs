@@ -7,14 +7,15 @@ use super::report::{Report, seconds};
 use holodrive::panel::{Frame, Modulation};
 use holodrive::progress::Progress;
 use holodrive::serve::{
-    self, Driver, KeepReport, KeepSettings, Output, ServeSettings, ServedPanel, Server, SimulatedOutput,
+    self, Announcement, Driver, KeepReport, KeepSettings, OnClientGone, Output, ServeSettings, ServedPanel, Server,
+    SimulatedOutput,
 };
 use holodrive::units::show_length;
 use holodrive::{Error, Result, files};
 use serde_json::json;
 use std::io::Write;
 use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 /// The usual ports of slmsuite and slmPy.
@@ -35,27 +36,126 @@ pub(super) fn serve(args: &ServeArgs, json: bool) -> Result<Report> {
     if monitor == "none" && args.trigger_patch.is_some() {
         return Err(Error::parameter("--trigger-patch", "the simulated panel has no corner that a photodiode sees"));
     }
-    let panel = panel(&args.panel, &mut report)?;
-    let correction = panel_correction(&panel, args.correction.as_deref(), &mut report)?;
-    report.warn(panel.profile.drive_curve(panel.wavelength)?.1);
-    let driver = Driver::new(&panel.profile, panel.wavelength, correction)?;
-    let idle = idle_frame(&args.idle, &panel, &driver, &mut report)?;
-    let served = driver.served(&name(args, &panel)?);
-    let settings = settings(args, &served, &mut report)?;
+    let service = Service::resolve(args, json, &mut report)?;
     let bar = Bar::new();
-    let job = Job { args, json, driver: &driver, idle: &idle, served, settings, progress: &bar.progress };
-    let kept = if monitor == "none" { job.simulated()? } else { job.on_monitor(monitor, &mut report)? };
-    let KeepReport { shown, failed, missed, .. } = kept;
-    report.add_serialised(
-        "served",
-        &kept,
-        format!(
-            "{shown} frames shown, {failed} refused, {missed} refreshes missed; from arrival to flip {} on average, {} at most",
-            seconds(kept.latency.mean),
-            seconds(kept.latency.longest)
-        ),
+    let kept = if monitor == "none" {
+        let server = service.start()?;
+        let mut output = SimulatedOutput::new(args.output.as_deref(), &service.idle)?;
+        service.keep(&server, &mut output, "the simulated panel", &bar.progress)?
+    } else {
+        on_monitor(args, monitor, &service, &bar.progress, &mut report)?
+    };
+    let KeepReport { shown, failed, missed, latency, .. } = &kept;
+    let line = format!(
+        "{shown} frames shown, {failed} refused, {missed} refreshes missed; from arrival to flip {} on average, {} at most",
+        seconds(latency.mean),
+        seconds(latency.longest)
     );
+    report.add_serialised("served", &kept, line);
     Ok(report)
+}
+
+#[cfg(feature = "display")]
+fn on_monitor(
+    args: &ServeArgs,
+    monitor: &str,
+    service: &Service,
+    progress: &Progress,
+    report: &mut Report,
+) -> Result<KeepReport> {
+    use holodrive::display::{Display, DisplayFrame, OnAbsence, PanelLoop, ShowEnd, ShowSettings};
+    if args.output.is_some() {
+        let what = "frames are written on the simulated panel only; give --monitor none, or leave it out";
+        return Err(Error::parameter("--output", what));
+    }
+    let trigger = args.trigger_patch.as_deref();
+    let settings = ShowSettings {
+        window: super::screen::window_settings(args.present, args.allow_altered_levels, trigger)?,
+        on_absence: OnAbsence::Wait,
+        ..ShowSettings::new(monitor.parse()?)
+    };
+    let mut display = Display::connect()?;
+    settings.monitor.find(&display.monitors()?)?;
+    // A port that is taken is found out before the panel shows anything.
+    let server = service.start()?;
+    let idle = std::sync::Arc::new(DisplayFrame::packed(&[&service.idle])?);
+    let mut output = PanelLoop::open(&mut display, &idle, &settings, progress)?;
+    report.warn(output.panel().warnings());
+    let place = output.panel().monitor().name.clone();
+    let kept = service.keep(&server, &mut output, &place, progress)?;
+    let window = output.close(if kept.closed { ShowEnd::Closed } else { ShowEnd::Stopped })?;
+    report.add_serialised("monitor", &window.monitor, "");
+    report.add("covered", window.covered, "");
+    Ok(kept)
+}
+
+#[cfg(not(feature = "display"))]
+fn on_monitor(_: &ServeArgs, _: &str, _: &Service, _: &Progress, _: &mut Report) -> Result<KeepReport> {
+    let what = "this build has no display: give --monitor none, or build it with the feature `display` (the default)";
+    Err(Error::unsupported(what))
+}
+
+/// What is served and how, as the flags say.
+struct Service {
+    driver: Driver,
+    panel: ServedPanel,
+    settings: ServeSettings,
+    idle: Frame,
+    on_client_gone: OnClientGone,
+    /// Whether clients are told where they come in as JSON.
+    json: bool,
+}
+
+impl Service {
+    fn resolve(args: &ServeArgs, json: bool, report: &mut Report) -> Result<Self> {
+        let panel = panel(&args.panel, report)?;
+        let correction = panel_correction(&panel, args.correction.as_deref(), report)?;
+        report.warn(panel.profile.drive_curve(panel.wavelength)?.1);
+        let driver = Driver::new(&panel.profile, panel.wavelength, correction)?;
+        let idle = idle_frame(&args.idle, &panel, &driver, report)?;
+        let served = driver.served(args.name.as_deref().unwrap_or(&panel.profile.name))?;
+        let settings = settings(args, &served, report)?;
+        Ok(Self { driver, panel: served, settings, idle, on_client_gone: args.on_client_gone, json })
+    }
+
+    fn start(&self) -> Result<Server> {
+        Server::start(self.panel.clone(), &self.settings)
+    }
+
+    /// Serves until the end. Where clients come in is said at once, since the report comes only then.
+    fn keep(&self, server: &Server, output: &mut dyn Output, place: &str, progress: &Progress) -> Result<KeepReport> {
+        let text = if self.json {
+            let mut serving = json!(server.announcement());
+            serving["on"] = place.into();
+            json!({ "serving": serving }).to_string()
+        } else {
+            announced(&server.announcement(), place)
+        };
+        let mut out = std::io::stdout();
+        match writeln!(out, "{text}").and_then(|()| out.flush()) {
+            // A reader that has gone needs no line; the panel is served all the same.
+            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => {}
+            other => other.map_err(|source| Error::Io { path: "standard output".into(), source })?,
+        }
+        let settings = KeepSettings { idle: &self.idle, on_client_gone: self.on_client_gone };
+        serve::keep(server, output, &self.driver, settings, progress)
+    }
+}
+
+fn announced(announcement: &Announcement, place: &str) -> String {
+    let Announcement { name, width, height, bits, wavelength, .. } = announcement;
+    let light = show_length(*wavelength);
+    let mut text = format!("serving {name}, {width}x{height} px of {bits} bits at {light}, on {place}");
+    if let Some(at) = announcement.slmsuite {
+        text += &format!("\n  slmsuite  {at}  RemoteSLM(\"{name}\", host=\"{}\", port={})", at.ip(), at.port());
+    }
+    if let Some(at) = announcement.slmpy {
+        text += &format!("\n  slmPy     {at}");
+    }
+    if let Some(at) = &announcement.local {
+        text += &format!("\n  local     {}  holodrive.SLM(\"{name}\")", at.display());
+    }
+    text
 }
 
 /// A level, or a picture of levels.
@@ -71,16 +171,6 @@ fn idle_frame(text: &str, panel: &Panel, driver: &Driver, report: &mut Report) -
     Ok(frame)
 }
 
-fn name(args: &ServeArgs, panel: &Panel) -> Result<String> {
-    let name = args.name.clone().unwrap_or_else(|| panel.profile.name.clone());
-    // It becomes a part of a file's name.
-    let fits = |c: char| !c.is_control() && !matches!(c, '/' | '\\' | '\'' | '"');
-    if name.is_empty() || name.len() > 64 || name.starts_with('.') || !name.chars().all(fits) {
-        return Err(Error::parameter("--name", format!("`{name}` is no name of up to 64 letters, digits and marks")));
-    }
-    Ok(name)
-}
-
 fn settings(args: &ServeArgs, served: &ServedPanel, report: &mut Report) -> Result<ServeSettings> {
     let calibrated = args.levels == ServedLevelsArg::Calibrated;
     if calibrated && served.modulation == Modulation::Amplitude {
@@ -91,8 +181,8 @@ fn settings(args: &ServeArgs, served: &ServedPanel, report: &mut Report) -> Resu
     let at = |port: u16| SocketAddr::new(args.listen, port);
     let local = match &args.local {
         Some(Some(path)) => Some(path.clone()),
-        Some(None) => usual_socket(&served.name),
-        None if none => usual_socket(&served.name),
+        Some(None) => serve::usual_socket(&served.name),
+        None if none => serve::usual_socket(&served.name),
         None => None,
     };
     if !args.listen.is_loopback() {
@@ -116,119 +206,4 @@ fn settings(args: &ServeArgs, served: &ServedPanel, report: &mut Report) -> Resu
         settle: Duration::from_secs_f64(if args.settle { served.settle_time.max(0.0) } else { 0.0 }),
         ..ServeSettings::default()
     })
-}
-
-#[cfg(unix)]
-fn usual_socket(name: &str) -> Option<PathBuf> {
-    Some(serve::local::runtime_folder().join(format!("{name}.sock")))
-}
-
-#[cfg(not(unix))]
-fn usual_socket(_: &str) -> Option<PathBuf> {
-    None
-}
-
-/// All that serving needs but the output.
-struct Job<'a> {
-    args: &'a ServeArgs,
-    json: bool,
-    driver: &'a Driver,
-    idle: &'a Frame,
-    served: ServedPanel,
-    settings: ServeSettings,
-    progress: &'a Progress,
-}
-
-impl Job<'_> {
-    fn simulated(&self) -> Result<KeepReport> {
-        let server = Server::start(self.served.clone(), &self.settings)?;
-        let mut output = SimulatedOutput::new(self.args.output.as_deref(), self.idle)?;
-        self.keep(&server, &mut output, "the simulated panel")
-    }
-
-    #[cfg(feature = "display")]
-    fn on_monitor(&self, monitor: &str, report: &mut Report) -> Result<KeepReport> {
-        use super::screen::window_settings;
-        use holodrive::display::{Display, DisplayFrame, OnAbsence, PanelLoop, ShowEnd, ShowSettings};
-        if self.args.output.is_some() {
-            let what = "frames are written on the simulated panel only; give --monitor none, or leave it out";
-            return Err(Error::parameter("--output", what));
-        }
-        let settings = ShowSettings {
-            window: window_settings(
-                self.args.present,
-                self.args.allow_altered_levels,
-                self.args.trigger_patch.as_deref(),
-            )?,
-            on_absence: OnAbsence::Wait,
-            ..ShowSettings::new(monitor.parse()?)
-        };
-        let mut display = Display::connect()?;
-        settings.monitor.find(&display.monitors()?)?;
-        // A port that is taken is found out before the panel shows anything.
-        let server = Server::start(self.served.clone(), &self.settings)?;
-        let idle = std::sync::Arc::new(DisplayFrame::packed(&[self.idle])?);
-        let mut output = PanelLoop::open(&mut display, &idle, &settings, self.progress)?;
-        report.warn(output.panel().warnings().iter());
-        let place = output.panel().monitor().name.clone();
-        let kept = self.keep(&server, &mut output, &place)?;
-        let window = output.close(ShowEnd::Stopped)?;
-        report.add_serialised("monitor", &window.monitor, "");
-        report.add("covered", window.covered, "");
-        Ok(kept)
-    }
-
-    #[cfg(not(feature = "display"))]
-    fn on_monitor(&self, _: &str, _: &mut Report) -> Result<KeepReport> {
-        let what =
-            "this build has no display: give --monitor none, or build it with the feature `display` (the default)";
-        Err(Error::unsupported(what))
-    }
-
-    fn keep(&self, server: &Server, output: &mut dyn Output, place: &str) -> Result<KeepReport> {
-        self.tell(server, place)?;
-        let on_client_gone = self.args.on_client_gone;
-        serve::keep(server, output, (self.driver, self.idle), KeepSettings { on_client_gone }, self.progress)
-    }
-
-    /// Says where clients come in: at once, since the report comes only at the end.
-    fn tell(&self, server: &Server, place: &str) -> Result<()> {
-        let ServedPanel { name, width, height, bits, wavelength, .. } = &self.served;
-        let (slmsuite, slmpy, local) = (server.slmsuite(), server.slmpy(), server.local());
-        let text = if self.json {
-            json!({ "serving": {
-                "name": name,
-                "on": place,
-                "width": width,
-                "height": height,
-                "bits": bits,
-                "wavelength": wavelength,
-                "slmsuite": slmsuite,
-                "slmpy": slmpy,
-                "local": local,
-            }})
-            .to_string()
-        } else {
-            let mut text = format!(
-                "serving {name}, {width}x{height} px of {bits} bits at {}, on {place}",
-                show_length(*wavelength)
-            );
-            if let Some(at) = slmsuite {
-                text += &format!("\n  slmsuite  {at}  RemoteSLM(\"{name}\", host=\"{}\", port={})", at.ip(), at.port());
-            }
-            if let Some(at) = slmpy {
-                text += &format!("\n  slmPy     {at}");
-            }
-            if let Some(at) = local {
-                text += &format!("\n  local     {}  holodrive.SLM(\"{name}\")", at.display());
-            }
-            text
-        };
-        let mut out = std::io::stdout();
-        match writeln!(out, "{text}").and_then(|()| out.flush()) {
-            // A reader that has gone needs no line; the panel is served all the same.
-            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-            other => other.map_err(|source| Error::Io { path: "standard output".into(), source }),
-        }
-    }
 }

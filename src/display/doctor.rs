@@ -97,58 +97,32 @@ fn judge_screen(screen: Option<&Screen>) -> Vec<Finding> {
 fn judge_monitor(monitor: &Monitor, properties: &[Property]) -> Vec<Finding> {
     let name = &monitor.name;
     let mut findings = Vec::new();
-    let mut add = |subject, severity, what: String| {
-        findings.push(Finding { monitor: Some(name.clone()), subject, severity, what });
+    let finding = |subject, severity, what: String| Finding { monitor: Some(name.clone()), subject, severity, what };
+    let faults = monitor.faults_by_subject();
+    let judge = |subject, good: &str| {
+        let of: Vec<&str> = faults.iter().filter(|(about, _)| *about == subject).map(|(_, fault)| &**fault).collect();
+        match of.is_empty() {
+            true => finding(subject, Severity::Good, good.into()),
+            false => finding(subject, Severity::Fault, of.join("; ")),
+        }
     };
     if let Some(scan_out) = &monitor.scan_out {
-        let mut clean = monitor.clone();
-        // Each part alone, so that each fault is told under its own subject in the words of `Monitor::faults`.
-        let mut part = |subject, good: &str, keep: fn(&mut Monitor)| {
-            clean.clone_from(monitor);
-            keep(&mut clean);
-            match clean.faults().pop() {
-                Some(fault) => add(subject, Severity::Fault, fault),
-                None => add(subject, Severity::Good, good.into()),
-            }
-        };
-        part("rotation", "neither turned nor mirrored", |m| only(m, |s, from| s.rotated = from.rotated));
-        part("scaling", "not scaled", |m| {
-            let scale = m.scale;
-            only(m, |s, from| s.transformed = from.transformed);
-            m.scale = scale;
-        });
-        part("mirroring", "no other monitor shows its part of the desktop", |m| {
-            only(m, |s, from| s.shared_with.clone_from(&from.shared_with));
-        });
-        match scan_out.gamma {
-            Gamma::Unknown => add("gamma", Severity::Unknown, "the driver has no table to read".into()),
-            Gamma::Identity | Gamma::Altered { .. } => {
-                part("gamma", "the table is the identity", |m| only(m, |s, from| s.gamma = from.gamma));
-            }
-        }
+        findings.extend([
+            judge("rotation", "neither turned nor mirrored"),
+            judge("scaling", "not scaled"),
+            judge("mirroring", "no other monitor shows its part of the desktop"),
+            match scan_out.gamma {
+                Gamma::Unknown => finding("gamma", Severity::Unknown, "the driver has no table to read".into()),
+                Gamma::Identity | Gamma::Altered { .. } => judge("gamma", "the table is the identity"),
+            },
+        ]);
     } else if monitor.scale != 1.0 {
-        add("scaling", Severity::Fault, monitor.faults().join("; "));
+        findings.push(judge("scaling", "not scaled"));
     }
     findings.push(judge_mode(monitor));
     findings.push(judge_range(monitor, properties));
     findings.extend(properties.iter().filter_map(|property| judge_property(name, property)));
     findings
-}
-
-/// Leaves of a monitor's scan-out only what `keep` copies.
-fn only(monitor: &mut Monitor, keep: fn(&mut super::ScanOut, &super::ScanOut)) {
-    monitor.scale = 1.0;
-    if let Some(from) = monitor.scan_out.take() {
-        let mut clean = super::ScanOut {
-            rotated: false,
-            transformed: false,
-            gamma: Gamma::Identity,
-            shared_with: Vec::new(),
-            preferred: from.preferred,
-        };
-        keep(&mut clean, &from);
-        monitor.scan_out = Some(clean);
-    }
 }
 
 fn judge_mode(monitor: &Monitor) -> Finding {

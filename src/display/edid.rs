@@ -59,6 +59,20 @@ pub struct NativeMode {
 impl Edid {
     /// Reads an EDID: the base block and, as far as they are there, its extensions.
     ///
+    /// ```
+    /// use holodrive::display::Edid;
+    ///
+    /// let mut bytes = [0; 128];
+    /// bytes[..8].copy_from_slice(&[0, 255, 255, 255, 255, 255, 255, 0]);
+    /// // The maker: three letters of five bits each.
+    /// bytes[8..10].copy_from_slice(&(8 << 10 | 15 << 5 | 5u16).to_be_bytes());
+    /// // A text descriptor, the monitor's name.
+    /// bytes[72..90].copy_from_slice(b"\0\0\0\xFC\0HE PLUTO-2.1\n");
+    /// let edid = Edid::parse(&bytes)?;
+    /// assert_eq!((edid.manufacturer.as_str(), edid.name.as_deref()), ("HOE", Some("HE PLUTO-2.1")));
+    /// # Ok::<(), holodrive::Error>(())
+    /// ```
+    ///
     /// # Errors
     ///
     /// [`Error::Display`] when `bytes` is shorter than a base block or does not begin with the EDID header.

@@ -1,7 +1,11 @@
 //! The frame as it leaves for the monitor: packed 8-bit RGB video pixels.
 
 use crate::error::{Error, Result};
+use crate::files;
 use crate::panel::{Frame, VideoFrame};
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder as _};
+use std::path::Path;
 
 /// One video frame: 8-bit RGB, row-major, row 0 on top, exactly the monitor's size.
 ///
@@ -70,6 +74,19 @@ impl DisplayFrame {
     /// The pixels, row-major, row 0 on top.
     pub fn pixels(&self) -> &[[u8; 3]] {
         &self.pixels
+    }
+
+    /// Writes it as a PNG.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] when the file cannot be written.
+    pub fn write_png(&self, path: &Path) -> Result<()> {
+        let refused = |error: image::ImageError| Error::unsupported(format!("{}: {error}", path.display()));
+        files::write_whole(path, |out| {
+            let (pixels, kind) = (self.pixels.as_flattened(), ExtendedColorType::Rgb8);
+            PngEncoder::new(out).write_image(pixels, self.width, self.height, kind).map_err(refused)
+        })
     }
 
     /// The pixels, to be drawn into.

@@ -17,6 +17,20 @@
 //!
 //! On X11 all of this is checked. On Wayland size, scale and rotation are; gamma tables and what else alters colours cannot
 //! be asked for. On other systems, what winit tells is checked.
+//!
+//! ```
+//! use holodrive::display::{DisplayFrame, MonitorChoice};
+//! use holodrive::panel::{Frame, PanelProfile};
+//!
+//! let panel = PanelProfile::find("generic")?;
+//! let levels = (0..panel.width * panel.height).map(|i| (i % 256) as u16).collect();
+//! let frame = DisplayFrame::packed(&[&Frame::new(&panel, 532e-9, levels)?])?;
+//! // An 8-bit level goes to all three colours of its pixel.
+//! assert_eq!((frame.width(), frame.height(), frame.pixels()[75]), (1920, 1080, [75; 3]));
+//! let choice: MonitorChoice = "serial:6010-0042".parse()?;
+//! assert_eq!(choice, MonitorChoice::Serial("6010-0042".into()));
+//! # Ok::<(), holodrive::Error>(())
+//! ```
 
 mod choice;
 mod doctor;
@@ -26,6 +40,7 @@ mod frame_times;
 mod kernel;
 mod keys;
 mod monitor;
+mod native;
 mod operator;
 mod panel_loop;
 mod play;

@@ -90,37 +90,55 @@ impl Gamma {
 impl Monitor {
     /// Everything known that would keep levels from reaching this monitor unchanged, each with its remedy.
     pub fn faults(&self) -> Vec<String> {
+        self.faults_by_subject().into_iter().map(|(_, fault)| fault).collect()
+    }
+
+    /// The faults, each under its subject: `scaling`, `rotation`, `gamma` or `mirroring`.
+    pub(super) fn faults_by_subject(&self) -> Vec<(&'static str, String)> {
         if !self.parts.is_empty() {
-            return self.parts.iter().flat_map(Self::faults).collect();
+            return self.parts.iter().flat_map(Self::faults_by_subject).collect();
         }
         let mut faults = Vec::new();
+        let mut add = |subject, fault| faults.push((subject, fault));
         let name = &self.name;
         if self.scale != 1.0 {
-            faults.push(format!("{name} is scaled by {}; set its scale to 1 in the desktop's settings", self.scale));
+            add("scaling", format!("{name} is scaled by {}; set its scale to 1 in the desktop's settings", self.scale));
         }
         let Some(scan_out) = &self.scan_out else { return faults };
         if scan_out.rotated {
-            faults.push(format!(
-                "{name} is rotated or mirrored; turn that off in the desktop's settings (on X11: xrandr --output {name} --rotate \
+            add(
+                "rotation",
+                format!(
+                    "{name} is rotated or mirrored; turn that off in the desktop's settings (on X11: xrandr --output {name} --rotate \
                  normal --reflect normal)"
-            ));
+                ),
+            );
         }
         if scan_out.transformed {
-            faults.push(format!(
-                "{name} is scaled by the graphics card; turn that off (xrandr --output {name} --scale 1 --transform none)"
-            ));
+            add(
+                "scaling",
+                format!(
+                    "{name} is scaled by the graphics card; turn that off (xrandr --output {name} --scale 1 --transform none)"
+                ),
+            );
         }
         if let Gamma::Altered { levels } = scan_out.gamma {
-            faults.push(format!(
-                "the graphics card's gamma table changes {levels} of 256 levels on {name}; turn night light and colour \
+            add(
+                "gamma",
+                format!(
+                    "the graphics card's gamma table changes {levels} of 256 levels on {name}; turn night light and colour \
                  profiles off for it (xrandr --output {name} --gamma 1:1:1 --brightness 1)"
-            ));
+                ),
+            );
         }
         if !scan_out.shared_with.is_empty() {
-            faults.push(format!(
-                "{name} shows the same part of the desktop as {}; place it beside (xrandr --output {name} --right-of …)",
-                scan_out.shared_with.join(", ")
-            ));
+            add(
+                "mirroring",
+                format!(
+                    "{name} shows the same part of the desktop as {}; place it beside (xrandr --output {name} --right-of …)",
+                    scan_out.shared_with.join(", ")
+                ),
+            );
         }
         faults
     }

@@ -4,23 +4,16 @@ use super::choice::MonitorChoice;
 use super::frame::DisplayFrame;
 use super::keys::KeyPress;
 use super::monitor::Monitor;
+use super::native::NativeWindow;
 use super::presenter::{Presenter, Surface};
-use super::session::{Display, Inbox};
-use super::window::x11_id;
-use super::x11::X11;
+use super::session::Display;
 use crate::error::{Error, Result};
-use std::cell::RefCell;
-use std::rc::Rc;
 use std::str::FromStr;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::window::Window;
 
-/// How long the window system may take to show the window.
-const SETTLE_LIMIT: Duration = Duration::from_secs(5);
-/// Wait between two looks while it settles.
-const LOOK: Duration = Duration::from_millis(5);
 /// How often a window that comes onto the panel's monitor is put back before it is closed.
 const PATIENCE: u32 = 5;
 /// Room between the monitor's corner and the window's [px].
@@ -80,9 +73,7 @@ impl OperatorChoice {
 /// An ordinary window with a picture of a fixed size. The surface goes before the window that it draws into.
 pub struct OperatorWindow {
     surface: Surface,
-    window: Arc<Window>,
-    inbox: Rc<RefCell<Inbox>>,
-    x11: Option<(Rc<X11>, u32)>,
+    native: NativeWindow,
     home: Monitor,
     panel: Monitor,
     last: Arc<DisplayFrame>,
@@ -106,46 +97,26 @@ impl OperatorWindow {
     /// # Errors
     /// [`Error::Display`] when no window can be made or drawn into, or it comes to stand on the panel's monitor.
     pub fn open(display: &mut Display, home: &Monitor, panel: &Monitor, first: &Arc<DisplayFrame>) -> Result<Self> {
-        let size = PhysicalSize::new(first.width(), first.height());
-        let place = corner(home, first);
-        let attributes = Window::default_attributes()
-            .with_title("holodrive: operator's view")
-            .with_position(place)
-            .with_inner_size(size)
-            .with_resizable(false)
-            .with_visible(false);
-        let window = display
-            .with_event_loop(|event_loop| event_loop.create_window(attributes))?
-            .map(Arc::new)
-            .map_err(|error| Error::Display { what: format!("no window can be made for the operator: {error}") })?;
-        let inbox = Rc::new(RefCell::new(Inbox::of_size(first.width(), first.height())));
-        display.watch(window.id(), &inbox);
-        let x11 = display.x11().zip(x11_id(&window));
-        window.set_visible(true);
-        let begin = Instant::now();
-        loop {
-            display.turn(LOOK)?;
-            let shown = match &x11 {
-                Some((x11, id)) => x11.placement(*id)?.is_some(),
-                None => true,
-            };
-            if shown && window.inner_size() == size {
-                break;
-            }
-            if begin.elapsed() > SETTLE_LIMIT {
-                let what = "the window system does not show the operator's view in its size; choose --operator none";
-                return Err(Error::Display { what: what.into() });
-            }
-        }
+        let (width, height) = (first.width(), first.height());
+        let (size, place) = (PhysicalSize::new(width, height), corner(home, first));
+        let native = NativeWindow::create(display, width, height, |_| {
+            let attributes = Window::default_attributes().with_title("holodrive: operator's view");
+            Ok(attributes.with_position(place).with_inner_size(size).with_resizable(false))
+        })?;
+        native.settle(display, Duration::ZERO, |native| {
+            let shown = native.x11.is_none() || native.placement()?.is_some();
+            let what = "the window system does not show the operator's view in its size; do without it";
+            Ok((!shown || native.window.inner_size() != size).then(|| what.into()))
+        })?;
         // A window manager may have put it elsewhere.
-        window.set_outer_position(place);
-        let mut surface = Surface::new(Presenter::Software, &window, first.width(), first.height())?;
+        native.window.set_outer_position(place);
+        let mut surface = Surface::new(Presenter::Software, &native.window, width, height)?;
         surface.present(first)?;
-        if let Some((x11, id)) = &x11 {
+        if let Some((x11, id)) = &native.x11 {
             x11.focus(*id)?;
         }
         let (home, panel, last) = (home.clone(), panel.clone(), Arc::clone(first));
-        Ok(Self { surface, window, inbox, x11, home, panel, last, strayed: 0 })
+        Ok(Self { surface, native, home, panel, last, strayed: 0 })
     }
 
     /// The monitor that it was opened on.
@@ -169,41 +140,36 @@ impl OperatorWindow {
     /// # Errors
     /// [`Error::Display`] when the connection to the window system is lost.
     pub fn attend(&mut self) -> Result<OperatorStanding> {
-        let (end, redraw, moved) = {
-            let mut inbox = self.inbox.borrow_mut();
-            let seen = (inbox.end_key || inbox.close, inbox.redraw, inbox.windows_changed || inbox.monitors_changed);
-            (inbox.redraw, inbox.windows_changed, inbox.monitors_changed) = (false, false, false);
-            seen
-        };
-        if end {
+        let events = self.native.events();
+        if events.end {
             return Ok(OperatorStanding::Ended);
         }
-        if moved && self.on_panel()? {
+        if (events.windows_changed || events.monitors_changed) && self.on_panel()? {
             self.strayed += 1;
             if self.strayed > PATIENCE {
-                self.window.set_visible(false);
+                self.native.window.set_visible(false);
                 return Ok(OperatorStanding::Strayed);
             }
-            self.window.set_outer_position(corner(&self.home, &self.last));
+            self.native.window.set_outer_position(corner(&self.home, &self.last));
         }
-        if redraw {
+        if events.redraw {
             self.surface.present(&self.last)?;
         }
         Ok(OperatorStanding::Shown)
     }
 
     /// Keys pressed in it since the last call.
-    pub fn keys(&mut self) -> Vec<KeyPress> {
-        std::mem::take(&mut self.inbox.borrow_mut().keys)
+    pub fn keys(&self) -> Vec<KeyPress> {
+        self.native.keys()
     }
 
     fn on_panel(&self) -> Result<bool> {
         let panel = self.panel.rectangle();
-        Ok(match &self.x11 {
-            Some((x11, id)) => x11.placement(*id)?.is_some_and(|place| place.meets(&panel)),
-            // Where the window system does not tell the place, it tells the monitor.
-            None => self.window.current_monitor().and_then(|m| m.name()).is_some_and(|name| name == self.panel.name),
-        })
+        if self.native.x11.is_some() {
+            return Ok(self.native.placement()?.is_some_and(|place| place.meets(&panel)));
+        }
+        // Where the window system does not tell the place, it tells the monitor.
+        Ok(self.native.window.current_monitor().and_then(|m| m.name()).is_some_and(|name| name == self.panel.name))
     }
 }
 

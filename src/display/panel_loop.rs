@@ -233,9 +233,9 @@ impl<'a> PanelLoop<'a> {
     }
 
     /// Keys pressed in either window since the last call, beside those that end the show.
-    pub fn keys(&mut self) -> Vec<KeyPress> {
+    pub fn keys(&self) -> Vec<KeyPress> {
         let mut keys = self.panel.keys();
-        keys.extend(self.operator.iter_mut().flat_map(OperatorWindow::keys));
+        keys.extend(self.operator.iter().flat_map(OperatorWindow::keys));
         keys
     }
 

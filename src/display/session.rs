@@ -36,23 +36,27 @@ pub struct Display {
     wayland: Option<super::wayland::Wayland>,
 }
 
-/// What has happened to one window and was not yet dealt with.
-#[derive(Debug, Default)]
-pub(super) struct Inbox {
-    /// Esc, Q or Ctrl+C was pressed in it.
-    pub(super) end_key: bool,
-    /// It was asked to close.
-    pub(super) close: bool,
+/// What has happened to a window.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct WindowEvents {
+    /// Esc, Q or Ctrl+C was pressed in it, or it was asked to close.
+    pub(super) end: bool,
     /// It has to be drawn again.
     pub(super) redraw: bool,
     /// Monitors may have changed since the window last made sure of its own.
     pub(super) monitors_changed: bool,
     /// Its place or size, or that of other windows, may have changed.
     pub(super) windows_changed: bool,
+}
+
+/// What has happened to one window and was not yet dealt with.
+#[derive(Debug, Default)]
+pub(super) struct Inbox {
+    events: WindowEvents,
     /// Other keys that were pressed in it.
     pub(super) keys: Vec<KeyPress>,
     /// The size that it must keep (columns, rows) [px].
-    pub(super) size: (u32, u32),
+    size: (u32, u32),
     modifiers: ModifiersState,
 }
 
@@ -60,6 +64,12 @@ impl Inbox {
     /// An empty one, for a window of that size [px].
     pub(super) fn of_size(width: u32, height: u32) -> Self {
         Self { size: (width, height), ..Self::default() }
+    }
+
+    /// The events since the last call; an end stays one.
+    pub(super) fn take_events(&mut self) -> WindowEvents {
+        let end = self.events.end;
+        std::mem::replace(&mut self.events, WindowEvents { end, ..WindowEvents::default() })
     }
 }
 
@@ -143,9 +153,9 @@ impl Display {
     fn tell(&mut self, monitors: bool, windows: bool) {
         self.windows.retain(|_, window| window.strong_count() > 0);
         for inbox in self.windows.values().filter_map(Weak::upgrade) {
-            let mut inbox = inbox.borrow_mut();
-            inbox.monitors_changed |= monitors;
-            inbox.windows_changed |= windows;
+            let events = &mut inbox.borrow_mut().events;
+            events.monitors_changed |= monitors;
+            events.windows_changed |= windows;
         }
     }
 
@@ -233,14 +243,14 @@ impl<F: FnOnce(&ActiveEventLoop)> ApplicationHandler for Handler<'_, F> {
         let Some(inbox) = self.windows.get(&id).and_then(Weak::upgrade) else { return };
         let mut inbox = inbox.borrow_mut();
         match event {
-            WindowEvent::CloseRequested | WindowEvent::Destroyed => inbox.close = true,
-            WindowEvent::RedrawRequested => inbox.redraw = true,
+            WindowEvent::CloseRequested | WindowEvent::Destroyed => inbox.events.end = true,
+            WindowEvent::RedrawRequested => inbox.events.redraw = true,
             WindowEvent::ModifiersChanged(modifiers) => inbox.modifiers = modifiers.state(),
             WindowEvent::KeyboardInput {
                 event: KeyEvent { logical_key, state: ElementState::Pressed, .. }, ..
             } => {
                 if ends(&logical_key, inbox.modifiers) {
-                    inbox.end_key = true;
+                    inbox.events.end = true;
                 } else if let Some(press) = KeyPress::of(&logical_key, inbox.modifiers)
                     && inbox.keys.len() < MOST_KEYS
                 {
@@ -251,13 +261,13 @@ impl<F: FnOnce(&ActiveEventLoop)> ApplicationHandler for Handler<'_, F> {
                 // Unless told otherwise, winit resizes the window to keep its size in scaled pixels.
                 let (width, height) = inbox.size;
                 if inner_size_writer.request_inner_size(PhysicalSize::new(width, height)).is_err() {
-                    inbox.windows_changed = true;
+                    inbox.events.windows_changed = true;
                 }
-                inbox.monitors_changed = true;
+                inbox.events.monitors_changed = true;
             }
             WindowEvent::Occluded(_) | WindowEvent::Moved(_) | WindowEvent::Resized(_) => {
-                inbox.monitors_changed = true;
-                inbox.windows_changed = true;
+                inbox.events.monitors_changed = true;
+                inbox.events.windows_changed = true;
             }
             _ => {}
         }

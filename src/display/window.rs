@@ -4,32 +4,25 @@ use super::choice::MonitorChoice;
 use super::frame::DisplayFrame;
 use super::keys::KeyPress;
 use super::monitor::Monitor;
+use super::native::NativeWindow;
 use super::presenter::{Presenter, Surface};
-use super::session::{Display, Inbox};
+use super::session::Display;
 use super::trigger::TriggerPatch;
 use super::vblank::VerticalBlank;
-use super::x11::X11;
 use crate::error::{Error, Result};
 use serde::Serialize;
-use std::cell::RefCell;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event_loop::ActiveEventLoop;
-use winit::raw_window_handle::{HasWindowHandle, RawWindowHandle};
 use winit::window::{Fullscreen, Window, WindowAttributes, WindowLevel};
 
 /// Assumed of a monitor that does not tell its refresh rate [Hz].
 const USUAL_REFRESH: f64 = 60.0;
 /// Refresh rates that a monitor may have [Hz].
 const REFRESH_RATES: std::ops::RangeInclusive<f64> = 1.0..=1e4;
-/// How long the window system may take to put the window where it belongs.
-const SETTLE_LIMIT: Duration = Duration::from_secs(5);
 /// How long it must have stood there before it counts as settled: window managers move a window just after it appears.
 const SETTLED: Duration = Duration::from_millis(50);
-/// Wait between two looks while it settles.
-const LOOK: Duration = Duration::from_millis(5);
 
 /// How a panel's window is made and held.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -95,9 +88,7 @@ pub struct PanelWindow {
 /// The parts that exist only while the monitor is there. The surface goes before the window that it draws into.
 struct Open {
     surface: Surface,
-    window: Arc<Window>,
-    inbox: Rc<RefCell<Inbox>>,
-    x11: Option<(Rc<X11>, u32)>,
+    native: NativeWindow,
     background: bool,
     blank: Option<VerticalBlank>,
 }
@@ -164,8 +155,8 @@ impl PanelWindow {
     }
 
     /// Keys pressed in it since the last call, beside those that end the show.
-    pub fn keys(&mut self) -> Vec<KeyPress> {
-        self.open.as_ref().map(|open| std::mem::take(&mut open.inbox.borrow_mut().keys)).unwrap_or_default()
+    pub fn keys(&self) -> Vec<KeyPress> {
+        self.open.as_ref().map(|open| open.native.keys()).unwrap_or_default()
     }
 
     /// What alters levels on this monitor, where that was allowed.
@@ -216,16 +207,13 @@ impl PanelWindow {
     /// is gone or changed, and opens it again when it is back.
     pub fn attend(&mut self, display: &mut Display) -> Result<Standing> {
         let Some(open) = &mut self.open else { return self.come_back(display) };
-        let (end, redraw, monitors_changed, windows_changed) = {
-            let mut inbox = open.inbox.borrow_mut();
-            let seen = (inbox.end_key || inbox.close, inbox.redraw, inbox.monitors_changed, inbox.windows_changed);
-            (inbox.redraw, inbox.monitors_changed, inbox.windows_changed) = (false, false, false);
-            seen
-        };
-        if end {
+        let events = open.native.events();
+        if events.end {
             return Ok(Standing::Ended);
         }
-        if monitors_changed && let Some(why) = self.misplaced(display)? {
+        if events.monitors_changed
+            && let Some(why) = self.misplaced(display)?
+        {
             self.open = None;
             // The window is gone from the screen only once the server has been told.
             display.turn(Duration::ZERO)?;
@@ -233,13 +221,13 @@ impl PanelWindow {
             return Ok(Standing::Absent { why });
         }
         let Some(open) = &mut self.open else { return Ok(Standing::Shown) };
-        if windows_changed
-            && let Some((x11, id)) = &open.x11
+        if events.windows_changed
+            && let Some((x11, id)) = &open.native.x11
             && x11.keep_above(*id)?
         {
             self.covered += 1;
         }
-        if redraw {
+        if events.redraw {
             open.surface.present(&self.last)?;
         }
         Ok(Standing::Shown)
@@ -260,8 +248,7 @@ impl PanelWindow {
         {
             return Ok(Some(fault));
         }
-        let Some(open) = &self.open else { return Ok(None) };
-        open.deviation(&self.monitor)
+        self.open.as_ref().map_or(Ok(None), |open| open.native.deviation(&self.monitor))
     }
 
     fn come_back(&mut self, display: &mut Display) -> Result<Standing> {
@@ -305,26 +292,24 @@ impl Open {
                 "a region of the desktop, or several monitors at once, can be covered on X11 only; name one monitor";
             return Err(Error::Display { what: what.into() });
         }
-        let window = display.with_event_loop(|event_loop| create(event_loop, monitor, on_x11))??;
-        let inbox = Rc::new(RefCell::new(Inbox::of_size(monitor.width, monitor.height)));
-        display.watch(window.id(), &inbox);
-        window.set_cursor_visible(false);
-        let x11 = display.x11().zip(x11_id(&window));
-        if let Some((x11, id)) = &x11 {
+        let Monitor { width, height, .. } = *monitor;
+        let native =
+            NativeWindow::create(display, width, height, |event_loop| attributes(event_loop, monitor, on_x11))?;
+        native.window.set_cursor_visible(false);
+        if let Some((x11, id)) = &native.x11 {
             x11.set_background(*id, first)?;
         }
-        window.set_visible(true);
-        settle(display, monitor, &window, x11.as_ref())?;
-        let mut surface = Surface::new(settings.presenter, &window, monitor.width, monitor.height)?;
+        native.settle(display, SETTLED, |native| native.deviation(monitor))?;
+        let mut surface = Surface::new(settings.presenter, &native.window, width, height)?;
         surface.present(first)?;
-        let background = x11.is_some();
+        let background = native.x11.is_some();
         // A server without the Present extension only leaves frames unsynchronised.
-        let blank = match &x11 {
+        let blank = match &native.x11 {
             Some((_, id)) if surface.presenter() == Presenter::Software => VerticalBlank::of_window(*id).ok(),
             _ => None,
         };
-        let open = Self { surface, window, inbox, x11, background, blank };
-        if let Some((x11, id)) = &open.x11 {
+        let open = Self { surface, native, background, blank };
+        if let Some((x11, id)) = &open.native.x11 {
             x11.keep_awake(true)?;
             x11.keep_above(*id)?;
             if settings.take_keyboard {
@@ -334,14 +319,9 @@ impl Open {
         Ok((open, faults))
     }
 
-    /// Where the window stands instead of on `monitor`, if so.
-    fn deviation(&self, monitor: &Monitor) -> Result<Option<String>> {
-        deviation(monitor, &self.window, self.x11.as_ref())
-    }
-
     fn forget_background(&mut self) -> Result<()> {
         if self.background
-            && let Some((x11, id)) = &self.x11
+            && let Some((x11, id)) = &self.native.x11
         {
             x11.clear_background(*id)?;
             self.background = false;
@@ -352,33 +332,28 @@ impl Open {
 
 impl Drop for Open {
     fn drop(&mut self) {
-        if let Some((x11, _)) = &self.x11 {
+        if let Some((x11, _)) = &self.native.x11 {
             // A connection that is lost has taken the request with it.
             let _ = x11.keep_awake(false);
         }
     }
 }
 
-fn create(event_loop: &ActiveEventLoop, monitor: &Monitor, on_x11: bool) -> Result<Arc<Window>> {
-    let mut attributes = Window::default_attributes()
+fn attributes(event_loop: &ActiveEventLoop, monitor: &Monitor, on_x11: bool) -> Result<WindowAttributes> {
+    let attributes = Window::default_attributes()
         .with_title(format!("holodrive: {}", monitor.name))
         .with_position(PhysicalPosition::new(monitor.x, monitor.y))
         .with_inner_size(PhysicalSize::new(monitor.width, monitor.height))
-        .with_decorations(false)
-        .with_visible(false);
+        .with_decorations(false);
     if on_x11 {
-        attributes = unmanaged(attributes);
-    } else {
-        let handle = event_loop.available_monitors().find(|handle| handle.name().as_ref() == Some(&monitor.name));
-        let Some(handle) = handle else {
-            return Err(Error::Display { what: format!("monitor {} is gone", monitor.name) });
-        };
-        attributes = attributes
-            .with_fullscreen(Some(Fullscreen::Borderless(Some(handle))))
-            .with_window_level(WindowLevel::AlwaysOnTop);
+        return Ok(unmanaged(attributes));
     }
-    let window = event_loop.create_window(attributes);
-    window.map(Arc::new).map_err(|error| Error::Display { what: format!("no window can be made: {error}") })
+    let handle = event_loop.available_monitors().find(|handle| handle.name().as_ref() == Some(&monitor.name));
+    let Some(handle) = handle else {
+        return Err(Error::Display { what: format!("monitor {} is gone", monitor.name) });
+    };
+    let fullscreen = Some(Fullscreen::Borderless(Some(handle)));
+    Ok(attributes.with_fullscreen(fullscreen).with_window_level(WindowLevel::AlwaysOnTop))
 }
 
 #[cfg(all(unix, not(any(target_vendor = "apple", target_os = "android"))))]
@@ -389,60 +364,6 @@ fn unmanaged(attributes: WindowAttributes) -> WindowAttributes {
 #[cfg(not(all(unix, not(any(target_vendor = "apple", target_os = "android")))))]
 fn unmanaged(attributes: WindowAttributes) -> WindowAttributes {
     attributes
-}
-
-pub(super) fn x11_id(window: &Window) -> Option<u32> {
-    match window.window_handle().ok()?.as_raw() {
-        RawWindowHandle::Xlib(handle) => u32::try_from(handle.window).ok(),
-        RawWindowHandle::Xcb(handle) => Some(handle.window.get()),
-        _ => None,
-    }
-}
-
-/// Waits until the window stands on its monitor and stays there.
-fn settle(display: &mut Display, monitor: &Monitor, window: &Window, x11: Option<&(Rc<X11>, u32)>) -> Result<()> {
-    let start = Instant::now();
-    let mut right_since = None;
-    loop {
-        display.turn(LOOK)?;
-        let wrong = deviation(monitor, window, x11)?;
-        let now = Instant::now();
-        match wrong {
-            None => {
-                if now - *right_since.get_or_insert(now) >= SETTLED {
-                    return Ok(());
-                }
-            }
-            Some(wrong) if now - start > SETTLE_LIMIT => return Err(Error::Display { what: wrong }),
-            Some(_) => right_since = None,
-        }
-    }
-}
-
-/// Where the window stands instead of exactly on `monitor`, if so.
-fn deviation(monitor: &Monitor, window: &Window, x11: Option<&(Rc<X11>, u32)>) -> Result<Option<String>> {
-    let name = &monitor.name;
-    if let Some((x11, id)) = x11 {
-        let wanted = monitor.rectangle();
-        return Ok(match x11.placement(*id)? {
-            Some(place) if place == wanted => None,
-            Some(place) => Some(format!("the window should cover {name} ({wanted}) but stands {place}")),
-            None => Some(format!("the window for {name} is not shown")),
-        });
-    }
-    let size = window.inner_size();
-    if (size.width, size.height) != (monitor.width, monitor.height) {
-        return Ok(Some(format!(
-            "the window should cover {name} with {}x{} px but the window system gave it {}x{}",
-            monitor.width, monitor.height, size.width, size.height
-        )));
-    }
-    if window.scale_factor() != 1.0 {
-        return Ok(Some(format!("the window system scales {name} by {}; set its scale to 1", window.scale_factor())));
-    }
-    // Wayland tells the monitor only once something has been drawn.
-    let elsewhere = window.current_monitor().and_then(|handle| handle.name()).filter(|on| on != name);
-    Ok(elsewhere.map(|on| format!("the window should be on {name} but the window system put it on {on}")))
 }
 
 fn check_size(frame: &DisplayFrame, monitor: &Monitor) -> Result<()> {

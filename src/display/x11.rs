@@ -12,7 +12,8 @@ use super::rectangle::Rectangle;
 use crate::error::{Error, Result};
 use std::fmt;
 use x11rb::connection::{Connection, RequestConnection};
-use x11rb::errors::ReplyError;
+use x11rb::cookie::Cookie;
+use x11rb::errors::{ConnectionError, ReplyError};
 use x11rb::protocol::Event;
 use x11rb::protocol::randr::{self, ConnectionExt as _, Crtc, GetCrtcInfoReply, GetOutputInfoReply, ModeInfo, Output};
 use x11rb::protocol::screensaver::{self, ConnectionExt as _};
@@ -21,11 +22,14 @@ use x11rb::protocol::xproto::{
     ImageOrder, InputFocus, MapState, StackMode, Window, WindowClass,
 };
 use x11rb::rust_connection::RustConnection;
+use x11rb::x11_utils::TryParse;
 
 /// 1 in the 16.16 fixed point of RandR transforms.
 const FIXED_ONE: i32 = 1 << 16;
 /// Longest EDID asked for, in the 4-byte units of the request: base block and seven extensions.
 const EDID_LIMIT: u32 = 8 * 128 / 4;
+
+type Request<'a, R> = std::result::Result<Cookie<'a, RustConnection, R>, ConnectionError>;
 
 /// A connection of our own to the X server.
 pub(super) struct X11 {
@@ -74,7 +78,7 @@ impl X11 {
     pub(super) fn connect() -> Result<Self> {
         let (connection, screen) = x11rb::connect(None).map_err(unanswered)?;
         let root = connection.setup().roots[screen].root;
-        let version = connection.randr_query_version(1, 3).map_err(unanswered)?.reply().map_err(unanswered)?;
+        let version = answer(connection.randr_query_version(1, 3))?;
         if (version.major_version, version.minor_version) < (1, 3) {
             return Err(Error::unsupported("the X server has no RandR 1.3: its monitors cannot be told apart"));
         }
@@ -83,25 +87,23 @@ impl X11 {
         connection.randr_select_input(root, notify).map_err(unanswered)?;
         let children = ChangeWindowAttributesAux::new().event_mask(EventMask::SUBSTRUCTURE_NOTIFY);
         connection.change_window_attributes(root, &children).map_err(unanswered)?;
-        let edid_property =
-            connection.intern_atom(false, b"EDID").map_err(unanswered)?.reply().map_err(unanswered)?.atom;
+        let edid_property = answer(connection.intern_atom(false, b"EDID"))?.atom;
         Ok(Self { connection, root, number: screen, edid_property })
     }
 
     /// The monitors that show a part of the desktop, in the server's order.
     pub(super) fn monitors(&self) -> Result<Vec<Monitor>> {
         let c = &self.connection;
-        let resources =
-            c.randr_get_screen_resources_current(self.root).map_err(unanswered)?.reply().map_err(unanswered)?;
-        let primary = c.randr_get_output_primary(self.root).map_err(unanswered)?.reply().map_err(unanswered)?.output;
+        let resources = answer(c.randr_get_screen_resources_current(self.root))?;
+        let primary = answer(c.randr_get_output_primary(self.root))?.output;
         let mut active = Vec::new();
         for &output in &resources.outputs {
             // What vanishes between two questions is not there.
-            let Some(info) = there(c.randr_get_output_info(output, 0).map_err(unanswered)?.reply())? else { continue };
+            let Some(info) = found(c.randr_get_output_info(output, 0))? else { continue };
             if info.crtc == 0 {
                 continue;
             }
-            let Some(crtc) = there(c.randr_get_crtc_info(info.crtc, 0).map_err(unanswered)?.reply())? else { continue };
+            let Some(crtc) = found(c.randr_get_crtc_info(info.crtc, 0))? else { continue };
             if crtc.mode != 0 && crtc.width > 0 && crtc.height > 0 {
                 let name = String::from_utf8_lossy(&info.name).into_owned();
                 active.push(ActiveOutput { name, output, info, crtc });
@@ -140,18 +142,14 @@ impl X11 {
     }
 
     fn edid(&self, output: Output) -> Result<Option<Edid>> {
-        let property = self
-            .connection
-            .randr_get_output_property(output, self.edid_property, AtomEnum::ANY, 0, EDID_LIMIT, false, false)
-            .map_err(unanswered)?
-            .reply();
+        let (c, any) = (&self.connection, AtomEnum::ANY);
+        let request = c.randr_get_output_property(output, self.edid_property, any, 0, EDID_LIMIT, false, false);
         // An EDID too damaged to read identifies nothing: the monitor is then known by its connector only.
-        Ok(there(property)?.filter(|property| property.format == 8).and_then(|p| Edid::parse(&p.data).ok()))
+        Ok(found(request)?.filter(|property| property.format == 8).and_then(|p| Edid::parse(&p.data).ok()))
     }
 
     fn transformed(&self, crtc: Crtc) -> Result<bool> {
-        let reply = self.connection.randr_get_crtc_transform(crtc).map_err(unanswered)?.reply();
-        Ok(there(reply)?.is_some_and(|reply| {
+        Ok(found(self.connection.randr_get_crtc_transform(crtc))?.is_some_and(|reply| {
             let m = reply.current_transform;
             [m.matrix11, m.matrix12, m.matrix13, m.matrix21, m.matrix22, m.matrix23, m.matrix31, m.matrix32, m.matrix33]
                 != [FIXED_ONE, 0, 0, 0, FIXED_ONE, 0, 0, 0, FIXED_ONE]
@@ -159,39 +157,37 @@ impl X11 {
     }
 
     fn gamma(&self, crtc: Crtc) -> Result<Gamma> {
-        let reply = self.connection.randr_get_crtc_gamma(crtc).map_err(unanswered)?.reply();
-        Ok(there(reply)?.map_or(Gamma::Unknown, |table| Gamma::of_table(&table.red, &table.green, &table.blue)))
+        let table = found(self.connection.randr_get_crtc_gamma(crtc))?;
+        Ok(table.map_or(Gamma::Unknown, |table| Gamma::of_table(&table.red, &table.green, &table.blue)))
     }
 
     /// What the server tells of the desktop as a whole.
     pub(super) fn screen(&self) -> Result<Screen> {
         let c = &self.connection;
-        let depth = c.get_geometry(self.root).map_err(unanswered)?.reply().map_err(unanswered)?.depth;
+        let depth = answer(c.get_geometry(self.root))?.depth;
         // A compositing manager owns this selection (ICCCM 2.8 and EWMH).
         let selection = format!("_NET_WM_CM_S{}", self.number);
-        let atom = c.intern_atom(false, selection.as_bytes()).map_err(unanswered)?.reply().map_err(unanswered)?.atom;
-        let owner = c.get_selection_owner(atom).map_err(unanswered)?.reply().map_err(unanswered)?.owner;
+        let atom = answer(c.intern_atom(false, selection.as_bytes()))?.atom;
+        let owner = answer(c.get_selection_owner(atom))?.owner;
         Ok(Screen { depth, composited: owner != x11rb::NONE })
     }
 
     /// The driver's settings of an output: names and words as they are, numbers in decimal with commas.
     pub(super) fn properties(&self, name: &str) -> Result<Vec<Property>> {
         let c = &self.connection;
-        let resources =
-            c.randr_get_screen_resources_current(self.root).map_err(unanswered)?.reply().map_err(unanswered)?;
+        let resources = answer(c.randr_get_screen_resources_current(self.root))?;
         let mut properties = Vec::new();
         for &output in &resources.outputs {
-            let info = there(c.randr_get_output_info(output, 0).map_err(unanswered)?.reply())?;
+            let info = found(c.randr_get_output_info(output, 0))?;
             if info.is_none_or(|info| info.name != name.as_bytes()) {
                 continue;
             }
-            let Some(list) = there(c.randr_list_output_properties(output).map_err(unanswered)?.reply())? else {
+            let Some(list) = found(c.randr_list_output_properties(output))? else {
                 continue;
             };
             for atom in list.atoms.into_iter().filter(|&atom| atom != self.edid_property) {
                 let request = c.randr_get_output_property(output, atom, AtomEnum::ANY, 0, 64, false, false);
-                let (Some(name), Some(value)) = (self.atom_name(atom)?, there(request.map_err(unanswered)?.reply())?)
-                else {
+                let (Some(name), Some(value)) = (self.atom_name(atom)?, found(request)?) else {
                     continue;
                 };
                 let words: Vec<String> = match (value.format, value.type_) {
@@ -210,7 +206,7 @@ impl X11 {
     }
 
     fn atom_name(&self, atom: u32) -> Result<Option<String>> {
-        let name = there(self.connection.get_atom_name(atom).map_err(unanswered)?.reply())?;
+        let name = found(self.connection.get_atom_name(atom))?;
         Ok(name.map(|name| String::from_utf8_lossy(&name.name).into_owned()))
     }
 
@@ -220,7 +216,7 @@ impl X11 {
     /// Does nothing on a screen whose pixels are not 8 bits of red, green and blue.
     pub(super) fn set_background(&self, window: Window, frame: &DisplayFrame) -> Result<()> {
         let c = &self.connection;
-        let depth = c.get_geometry(window).map_err(unanswered)?.reply().map_err(unanswered)?.depth;
+        let depth = answer(c.get_geometry(window))?.depth;
         let setup = c.setup();
         let four_bytes = setup.pixmap_formats.iter().any(|format| format.depth == depth && format.bits_per_pixel == 32);
         let (Ok(width), Ok(height)) = (u16::try_from(frame.width()), u16::try_from(frame.height())) else {
@@ -260,14 +256,14 @@ impl X11 {
     /// Where `window` is on the desktop, or none when it is not shown.
     pub(super) fn placement(&self, window: Window) -> Result<Option<Rectangle>> {
         let c = &self.connection;
-        let Some(attributes) = there(c.get_window_attributes(window).map_err(unanswered)?.reply())? else {
+        let Some(attributes) = found(c.get_window_attributes(window))? else {
             return Ok(None);
         };
         if attributes.map_state != MapState::VIEWABLE {
             return Ok(None);
         }
-        let size = there(c.get_geometry(window).map_err(unanswered)?.reply())?;
-        let corner = there(c.translate_coordinates(window, self.root, 0, 0).map_err(unanswered)?.reply())?;
+        let size = found(c.get_geometry(window))?;
+        let corner = found(c.translate_coordinates(window, self.root, 0, 0))?;
         Ok(size.zip(corner).map(|(size, corner)| Rectangle {
             x: corner.dst_x.into(),
             y: corner.dst_y.into(),
@@ -301,10 +297,10 @@ impl X11 {
         let c = &self.connection;
         let Some(place) = self.placement(window)? else { return Ok(false) };
         // Bottom to top.
-        let stack = c.query_tree(self.root).map_err(unanswered)?.reply().map_err(unanswered)?.children;
+        let stack = answer(c.query_tree(self.root))?.children;
         let above = stack.iter().rev().take_while(|&&other| other != window);
         for &other in above {
-            let attributes = there(c.get_window_attributes(other).map_err(unanswered)?.reply())?;
+            let attributes = found(c.get_window_attributes(other))?;
             let drawn = |a: &_| {
                 matches!(a, x11rb::protocol::xproto::GetWindowAttributesReply { map_state, class, .. }
                     if *map_state == MapState::VIEWABLE && *class == WindowClass::INPUT_OUTPUT)
@@ -312,7 +308,7 @@ impl X11 {
             if !attributes.as_ref().is_some_and(drawn) {
                 continue;
             }
-            let Some(g) = there(c.get_geometry(other).map_err(unanswered)?.reply())? else { continue };
+            let Some(g) = found(c.get_geometry(other))? else { continue };
             let border = 2 * u32::from(g.border_width);
             let (width, height) = (u32::from(g.width) + border, u32::from(g.height) + border);
             if place.meets(&Rectangle { x: g.x.into(), y: g.y.into(), width, height }) {
@@ -357,6 +353,16 @@ fn refresh(mode: &ModeInfo) -> Option<f64> {
 /// The 32-bit words of a property; x11rb has put them into this machine's byte order.
 fn words_of(bytes: &[u8]) -> impl Iterator<Item = u32> {
     bytes.chunks_exact(4).map(|word| u32::from_ne_bytes([word[0], word[1], word[2], word[3]]))
+}
+
+/// The answer to a question about what is there for certain.
+fn answer<R: TryParse>(request: Request<'_, R>) -> Result<R> {
+    request.map_err(unanswered)?.reply().map_err(unanswered)
+}
+
+/// The answer to a question about a thing that may have gone; then there is none.
+fn found<R: TryParse>(request: Request<'_, R>) -> Result<Option<R>> {
+    there(request.map_err(unanswered)?.reply())
 }
 
 fn unanswered(error: impl fmt::Display) -> Error {

@@ -15,13 +15,13 @@ use super::sampling::hemisphere;
 use crate::error::Result;
 use crate::progress::Progress;
 use crate::random::Random;
-use crate::scene::bvh::{Ray, Sides};
+use crate::scene::bvh::{Ray, SceneBvh, Sides};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Where a gathering ray has ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum RayEnd {
+pub(crate) enum End {
     /// On a sender of the mesh.
     Sender(u32),
     /// On something that reflects nothing diffusely.
@@ -36,6 +36,7 @@ const BLACK: u32 = NONE;
 /// The surfaces that gathering rays meet.
 #[derive(Clone, Copy)]
 pub(crate) struct Surroundings<'a> {
+    pub(crate) bvh: &'a SceneBvh,
     pub(crate) mesh: &'a Elements,
     pub(crate) senders: &'a Senders,
     pub(crate) optics: &'a Optics,
@@ -44,31 +45,31 @@ pub(crate) struct Surroundings<'a> {
 impl Surroundings<'_> {
     /// Follows a ray to what sends the light that it brings, with what optics on the way leave of it; emission of sampled
     /// emitters is not part of that.
-    pub(crate) fn follow(&self, ray: Ray, random: &mut Random) -> (RayEnd, Vec3) {
+    pub(crate) fn follow(&self, ray: Ray, random: &mut Random) -> (End, Vec3) {
         let mut ray = ray;
         let mut weight = Vec3::ONE;
         for _ in 0..self.optics.bounces {
-            let Some(meeting) = self.optics.bvh.meet(&ray, 0.0, f64::INFINITY, Sides::Both) else {
-                return (RayEnd::Escaped, weight);
+            let Some(meeting) = self.bvh.meet(&ray, 0.0, f64::INFINITY, Sides::Both) else {
+                return (End::Escaped, weight);
             };
             if self.optics.optical[meeting.triangle as usize] {
-                match self.optics.next(&ray, &meeting, random) {
+                match self.optics.next(self.bvh, &ray, &meeting, random) {
                     Continuation::Onward(next, tint, _) => {
                         ray = next;
                         weight *= tint;
                         continue;
                     }
-                    Continuation::Absorbed => return (RayEnd::Black, weight),
+                    Continuation::Absorbed => return (End::Black, weight),
                     Continuation::Diffuse(share) => weight *= share,
                 }
             }
             let sender = self
                 .mesh
                 .locate(meeting.triangle, meeting.front, meeting.barycentric)
-                .and_then(|(element, weights)| self.mesh.sender(&self.optics.bvh, self.senders, element, weights));
-            return (sender.map_or(RayEnd::Black, RayEnd::Sender), weight);
+                .and_then(|(element, weights)| self.mesh.sender(self.bvh, self.senders, element, weights));
+            return (sender.map_or(End::Black, End::Sender), weight);
         }
-        (RayEnd::Black, weight)
+        (End::Black, weight)
     }
 }
 
@@ -87,7 +88,7 @@ pub(crate) struct Transport {
 
 /// What one vertex found beside the senders that it sees plainly.
 #[derive(Default)]
-struct VertexGather {
+struct Found {
     tinted: Vec<(u32, Vec3)>,
     counted: f32,
     escaped: Vec3,
@@ -97,17 +98,17 @@ struct VertexGather {
 impl Transport {
     /// Casts `side`² rays from each vertex.
     pub(crate) fn cast(around: &Surroundings, side: usize, seed: u64, progress: &Progress) -> Result<Self> {
-        let (bvh, mesh) = (&around.optics.bvh, around.mesh);
+        let (bvh, mesh) = (around.bvh, around.mesh);
         let rays = side * side;
         let mut ends = vec![BLACK; mesh.vertices.len() * rays];
         progress.start("gathering indirect light", mesh.vertices.len() as u64);
-        let found: Vec<VertexGather> = ends
+        let found: Vec<Found> = ends
             .par_chunks_mut(rays.max(1))
             .zip(&mesh.vertices)
             .enumerate()
             .map(|(index, (ends, vertex))| {
                 progress.advance(1);
-                let mut found = VertexGather::default();
+                let mut found = Found::default();
                 if vertex.buried || progress.stopped() {
                     found.counted = rays as f32;
                     found.absorbed = Vec3::splat(found.counted);
@@ -123,16 +124,16 @@ impl Transport {
                     }
                     found.counted += 1.0;
                     let (reached, tint) = around.follow(Ray { origin, direction }, &mut random);
-                    let left = if reached == RayEnd::Black { Vec3::ZERO } else { tint };
+                    let left = if reached == End::Black { Vec3::ZERO } else { tint };
                     found.absorbed += Vec3::ONE - left;
                     *end = match reached {
-                        RayEnd::Escaped => {
+                        End::Escaped => {
                             found.escaped += tint;
                             BLACK
                         }
-                        RayEnd::Black => BLACK,
-                        RayEnd::Sender(sender) if tint == Vec3::ONE => sender,
-                        RayEnd::Sender(sender) => {
+                        End::Black => BLACK,
+                        End::Sender(sender) if tint == Vec3::ONE => sender,
+                        End::Sender(sender) => {
                             found.tinted.push((sender, tint));
                             BLACK
                         }

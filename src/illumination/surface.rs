@@ -1,57 +1,53 @@
 //! What a surface does to light at one point: glTF's material with its textures read.
 
-use super::reflection::{MIRROR_ALPHA, WIDE_LOBE, dielectric_reflectance};
-use crate::scene::{AlphaMode, Hit, Scene, TextureRef, Triangle};
+use super::paths::dielectric_reflectance;
+use crate::scene::{AlphaMode, Hit, Scene};
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
+
+/// Perceptual roughness from which a specular lobe is so wide that light transport takes it for diffuse.
+pub(crate) const WIDE_LOBE: f32 = 0.5;
+/// GGX α below which a lobe is narrower than a pixel of any picture: a mirror.
+pub(crate) const MIRROR_ALPHA: f32 = 2e-3;
 
 /// A surface at a point, ready for shading. Colours are linear Rec.709.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Surface {
+pub struct Surface {
     /// Where [m].
-    pub(crate) position: DVec3,
+    pub position: DVec3,
     /// Unit geometric normal on the side that was met.
-    pub(crate) facing: DVec3,
+    pub facing: DVec3,
     /// Unit shading normal on the same side.
-    pub(crate) normal: DVec3,
+    pub normal: DVec3,
     /// Lambertian albedo.
-    pub(crate) albedo: Vec3,
+    pub albedo: Vec3,
     /// Specular reflectance at normal incidence.
-    pub(crate) specular: Vec3,
+    pub specular: Vec3,
     /// GGX α = perceptual roughness².
-    pub(crate) alpha: f32,
+    pub alpha: f32,
     /// Radiance emitted on the side that was met [W/(m² sr)].
-    pub(crate) emission: Vec3,
+    pub emission: Vec3,
     /// Part of the light that is not reflected and goes through instead of being scattered, times the tint.
-    pub(crate) transmission: Vec3,
+    pub transmission: Vec3,
     /// Index of refraction of what is behind the front side.
-    pub(crate) ior: f64,
+    pub ior: f64,
     /// Whether the surface bounds a volume (refracts) or is a thin wall (does not).
-    pub(crate) volume: bool,
+    pub volume: bool,
     /// Whether base colour is radiance and no light counts.
-    pub(crate) unlit: bool,
+    pub unlit: bool,
     /// Coverage: below one, part of the light goes straight on (alpha blending).
-    pub(crate) coverage: f32,
+    pub coverage: f32,
     /// Whether the front was met.
-    pub(crate) front: bool,
-}
-
-/// A point that is lit, lifted off its surface.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ShadingPoint {
-    /// Where [m].
-    pub(crate) position: DVec3,
-    /// Unit shading normal.
-    pub(crate) normal: DVec3,
+    pub front: bool,
 }
 
 impl Surface {
     /// Reads the material at a hit; textures are averaged over `footprint`, the width of what is looked at [m].
-    pub(crate) fn at(scene: &Scene, hit: &Hit, footprint: f64) -> Self {
+    pub fn at(scene: &Scene, hit: &Hit, footprint: f64) -> Self {
         let triangle = &scene.triangles[hit.triangle as usize];
         let material = scene.material(hit.triangle);
         let [v, w] = hit.barycentric.map(|b| b as f32);
         let u = 1.0 - v - w;
-        let texel = |reference: &TextureRef| -> Vec4 {
+        let texel = |reference: &crate::scene::TextureRef| -> Vec4 {
             let [a, b, c] = triangle.texcoords.map(|sets| sets[reference.texcoord as usize & 1]);
             let uv = reference.transform(a * u + b * v + c * w);
             let width = if footprint > 0.0 {
@@ -129,13 +125,8 @@ impl Surface {
         self
     }
 
-    /// The point from which rays leave: lifted by `offset` off the side that was met [m].
-    pub(crate) fn shading_point(&self, offset: f64) -> ShadingPoint {
-        ShadingPoint { position: self.position + self.facing * offset, normal: self.normal }
-    }
-
     /// Whether a specular lobe counts at all.
-    pub(crate) fn is_specular(&self) -> bool {
+    pub fn is_specular(&self) -> bool {
         self.specular.max_element() > 0.0
     }
 
@@ -145,7 +136,7 @@ impl Surface {
     }
 
     /// Whether anything of the surface scatters light diffusely.
-    pub(crate) fn is_diffuse(&self) -> bool {
+    pub fn is_diffuse(&self) -> bool {
         self.albedo.max_element() > 0.0
     }
 
@@ -167,7 +158,7 @@ impl Surface {
     }
 
     /// Schlick's Fresnel reflectance for a cosine of incidence, 1994.
-    pub(crate) fn fresnel(&self, cosine: f64) -> Vec3 {
+    pub fn fresnel(&self, cosine: f64) -> Vec3 {
         let grazing = (1.0 - cosine.clamp(0.0, 1.0)).powi(5) as f32;
         if self.is_specular() { self.specular + (Vec3::ONE - self.specular) * grazing } else { Vec3::ZERO }
     }
@@ -179,7 +170,14 @@ fn mean_fresnel(f0: f32) -> f32 {
 }
 
 /// The normal of a tangent-space texture; tangents follow the texture coordinates, as glTF says when none are given.
-fn bumped(triangle: &Triangle, reference: &TextureRef, texel: Vec4, scale: f32, normal: DVec3, side: f64) -> DVec3 {
+fn bumped(
+    triangle: &crate::scene::Triangle,
+    reference: &crate::scene::TextureRef,
+    texel: Vec4,
+    scale: f32,
+    normal: DVec3,
+    side: f64,
+) -> DVec3 {
     let [a, b, c] = triangle.texcoords.map(|sets| reference.transform(sets[reference.texcoord as usize & 1]));
     let [pa, pb, pc] = triangle.corners();
     let (d1, d2) = ((b - a).as_dvec2(), (c - a).as_dvec2());

@@ -4,9 +4,12 @@ use std::time::Instant;
 
 /// The moment `at` on the system's monotonic clock [s], as Python's `time.monotonic()` and C's `clock_gettime` tell it.
 ///
-/// None where that clock cannot be read.
+/// None where that clock cannot be read, or is not the one of [`Instant`] (macOS, Windows).
+#[cfg(all(unix, not(target_vendor = "apple")))]
 pub fn monotonic_seconds(at: Instant) -> Option<f64> {
-    let (before, clock) = (Instant::now(), now()?);
+    use rustix::time::{ClockId, clock_gettime};
+    let (before, clock) = (Instant::now(), clock_gettime(ClockId::Monotonic));
+    let clock = clock.tv_sec as f64 + clock.tv_nsec as f64 * 1e-9;
     // Both are the same clock, so that only the time between the two readings is an error: below a microsecond.
     Some(match at.checked_duration_since(before) {
         Some(ahead) => clock + ahead.as_secs_f64(),
@@ -14,32 +17,13 @@ pub fn monotonic_seconds(at: Instant) -> Option<f64> {
     })
 }
 
-#[cfg(unix)]
-fn now() -> Option<f64> {
-    // The clocks behind `Instant` and behind Python's `time.monotonic`.
-    #[cfg(target_vendor = "apple")]
-    const CLOCK: libc::clockid_t = libc::CLOCK_UPTIME_RAW;
-    #[cfg(not(target_vendor = "apple"))]
-    const CLOCK: libc::clockid_t = libc::CLOCK_MONOTONIC;
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: `time` is ours and lives through the call, which writes nothing else.
-    let told = unsafe { libc::clock_gettime(CLOCK, &raw mut time) };
-    (told == 0).then_some(time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9)
-}
-
-#[cfg(not(unix))]
-fn now() -> Option<f64> {
+/// The moment `at` on the system's monotonic clock [s]: here it is not that of [`Instant`].
+#[cfg(not(all(unix, not(target_vendor = "apple"))))]
+pub fn monotonic_seconds(_: Instant) -> Option<f64> {
     None
 }
 
-/// The user that runs this process.
-#[cfg(unix)]
-pub(super) fn user() -> u32 {
-    // SAFETY: takes nothing, writes nothing, cannot fail.
-    unsafe { libc::geteuid() }
-}
-
-#[cfg(all(test, unix))]
+#[cfg(all(test, unix, not(target_vendor = "apple")))]
 mod tests {
     use super::*;
     use std::time::Duration;

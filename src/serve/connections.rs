@@ -1,15 +1,17 @@
 //! The server: who may connect, how many at once, and where their frames go. Each client has a thread of its own.
 
 use super::conversation::Conversation;
+#[cfg(unix)]
+use super::local::LocalSocket;
 use super::stream::Stream;
-use super::{FrameRequest, ServeCounts, ServeSettings, ServedPanel};
+use super::{Announcement, FrameRequest, ServeCounts, ServeSettings, ServedPanel};
 use crate::error::{Error, Result};
 use std::io;
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -17,7 +19,7 @@ use std::time::{Duration, Instant};
 pub struct Server {
     shared: Arc<Shared>,
     frames: Receiver<FrameRequest>,
-    listeners: Vec<(Door, JoinHandle<()>)>,
+    listeners: Vec<(Address, JoinHandle<()>)>,
     slmsuite: Option<SocketAddr>,
     slmpy: Option<SocketAddr>,
 }
@@ -32,7 +34,7 @@ pub(super) struct Shared {
     pub(super) held: AtomicUsize,
     pub(super) frames: SyncSender<FrameRequest>,
     #[cfg(unix)]
-    local: Option<super::local::Place>,
+    local: Option<LocalSocket>,
     connections: usize,
     stopping: AtomicBool,
     clients: Mutex<Vec<Arc<Client>>>,
@@ -61,8 +63,8 @@ enum Protocol {
     Local,
 }
 
-/// Where clients come in.
-enum Door {
+/// Where clients connect.
+enum Address {
     Tcp(SocketAddr),
     #[cfg(unix)]
     Local(std::path::PathBuf),
@@ -82,18 +84,17 @@ impl Server {
             return Err(Error::parameter("panel", format!("{width}x{height} px of {bits} bits cannot be served")));
         }
         if settings.slmsuite.is_none() && settings.slmpy.is_none() && settings.local.is_none() {
-            let what = "no protocol is to be spoken; give --slmsuite or --slmpy a port, or --local";
+            let what = "no protocol is to be spoken; give slmsuite's or slmPy's a port, or a local socket";
             return Err(Error::parameter("serve", what));
         }
         if cfg!(not(unix)) && settings.local.is_some() {
-            return Err(Error::unsupported("the local socket needs a Unix; give --slmsuite or --slmpy a port instead"));
+            return Err(Error::unsupported(
+                "the local socket needs a Unix; give slmsuite's or slmPy's protocol a port instead",
+            ));
         }
         // The socket first: whoever is refused for it must not have opened ports already.
         #[cfg(unix)]
-        let (place, door) = match &settings.local {
-            Some(path) => super::local::Place::take(path).map(|(place, door)| (Some(place), Some(door)))?,
-            None => (None, None),
-        };
+        let (socket, listener) = settings.local.as_deref().map(LocalSocket::take).transpose()?.unzip();
         let (sender, frames) = sync_channel(1);
         let shared = Arc::new(Shared {
             panel,
@@ -103,7 +104,7 @@ impl Server {
             held: AtomicUsize::new(0),
             frames: sender,
             #[cfg(unix)]
-            local: place,
+            local: socket,
             connections: settings.connections.max(1),
             stopping: AtomicBool::new(false),
             clients: Mutex::new(Vec::new()),
@@ -113,9 +114,9 @@ impl Server {
         server.slmsuite = settings.slmsuite.map(|address| server.listen(address, Protocol::Slmsuite)).transpose()?;
         server.slmpy = settings.slmpy.map(|address| server.listen(address, Protocol::Slmpy)).transpose()?;
         #[cfg(unix)]
-        if let (Some(door), Some(path)) = (door, server.local().map(Path::to_path_buf)) {
-            let come = move || door.accept().map(|(stream, _)| (Stream::Local(stream), "local".to_owned()));
-            server.admit(Door::Local(path), Protocol::Local, come);
+        if let (Some(listener), Some(path)) = (listener, server.local().map(Path::to_path_buf)) {
+            let accept = move || listener.accept().map(|(stream, _)| Stream::Local(stream));
+            server.take_clients(Address::Local(path), Protocol::Local, accept);
         }
         Ok(server)
     }
@@ -126,33 +127,33 @@ impl Server {
         };
         let listener = TcpListener::bind(address).map_err(no)?;
         let address = listener.local_addr().map_err(no)?;
-        let come = move || listener.accept().map(|(stream, from)| (Stream::Tcp(stream), from.to_string()));
-        self.admit(Door::Tcp(address), protocol, come);
+        let accept = move || listener.accept().map(|(stream, _)| Stream::Tcp(stream));
+        self.take_clients(Address::Tcp(address), protocol, accept);
         Ok(address)
     }
 
-    /// Lets clients in as they come, in a thread that ends with the server.
-    fn admit(
+    /// Takes clients as they connect, in a thread that ends with the server.
+    fn take_clients(
         &mut self,
-        door: Door,
+        address: Address,
         protocol: Protocol,
-        come: impl Fn() -> io::Result<(Stream, String)> + Send + 'static,
+        accept: impl Fn() -> io::Result<Stream> + Send + 'static,
     ) {
         let shared = Arc::clone(&self.shared);
         let thread = std::thread::spawn(move || {
             loop {
-                let guest = come();
+                let accepted = accept();
                 if shared.stopping.load(Ordering::SeqCst) {
                     break;
                 }
-                match guest {
-                    Ok((stream, from)) => Shared::welcome(&shared, stream, from, protocol),
+                match accepted {
+                    Ok(stream) => Shared::start_client(&shared, stream, protocol),
                     // Out of descriptors, or a client that went at once: neither may end the server, nor make it spin.
                     Err(_) => std::thread::sleep(Duration::from_millis(10)),
                 }
             }
         });
-        self.listeners.push((door, thread));
+        self.listeners.push((address, thread));
     }
 
     /// Where slmsuite's protocol is spoken.
@@ -168,7 +169,7 @@ impl Server {
     /// The socket of the local protocol.
     #[cfg(unix)]
     pub fn local(&self) -> Option<&Path> {
-        self.shared.local.as_ref().map(super::local::Place::socket)
+        self.shared.local.as_ref().map(LocalSocket::socket)
     }
 
     /// The socket of the local protocol: there is none on this system.
@@ -192,8 +193,14 @@ impl Server {
 
     /// Whether the client of that number ([`FrameRequest::client`]) is still connected.
     pub fn is_connected(&self, client: u64) -> bool {
-        let clients = self.shared.clients.lock().unwrap_or_else(PoisonError::into_inner);
-        clients.iter().any(|other| other.number == client)
+        self.shared.clients().iter().any(|other| other.number == client)
+    }
+
+    /// What clients have to know to find it.
+    pub fn announcement(&self) -> Announcement {
+        let ServedPanel { name, width, height, bits, wavelength, .. } = self.shared.panel.clone();
+        let (slmsuite, slmpy, local) = (self.slmsuite, self.slmpy, self.local().map(Path::to_path_buf));
+        Announcement { name, width, height, bits, wavelength, slmsuite, slmpy, local }
     }
 
     /// What has come in so far.
@@ -207,24 +214,26 @@ impl Server {
 impl Drop for Server {
     fn drop(&mut self) {
         self.shared.stopping.store(true, Ordering::SeqCst);
-        for client in self.shared.clients.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+        for client in self.shared.clients().iter() {
             client.stream.shutdown();
         }
-        for (door, thread) in self.listeners.drain(..) {
+        for (address, thread) in self.listeners.drain(..) {
             // A connection wakes the listener, which then sees that it is to stop. Without it the thread stays, waiting,
             // and does no harm.
-            let knocked = match &door {
-                Door::Tcp(address) => TcpStream::connect_timeout(&reachable(*address), Duration::from_secs(1)).is_ok(),
+            let woken = match &address {
+                Address::Tcp(address) => {
+                    TcpStream::connect_timeout(&reachable(*address), Duration::from_secs(1)).is_ok()
+                }
                 #[cfg(unix)]
-                Door::Local(path) => std::os::unix::net::UnixStream::connect(path).is_ok(),
+                Address::Local(path) => std::os::unix::net::UnixStream::connect(path).is_ok(),
             };
-            if knocked {
+            if woken {
                 let _ = thread.join();
             }
         }
         #[cfg(unix)]
-        if let Some(place) = &self.shared.local {
-            place.leave();
+        if let Some(socket) = &self.shared.local {
+            socket.remove();
         }
     }
 }
@@ -248,39 +257,29 @@ impl Shared {
     /// Where the local protocol's buffers lie.
     #[cfg(unix)]
     pub(super) fn local_folder(&self) -> &Path {
-        self.local.as_ref().map_or(Path::new("."), super::local::Place::folder)
+        self.local.as_ref().map_or(Path::new("."), LocalSocket::folder)
     }
 
     /// Takes a client in, in a thread of its own; if there are too many, cuts off the longest silent one.
-    fn welcome(shared: &Arc<Self>, stream: Stream, from: String, protocol: Protocol) {
+    fn start_client(shared: &Arc<Self>, stream: Stream, protocol: Protocol) {
         let number = shared.count(CONNECTIONS);
-        let Ok(own) = stream.try_clone() else { return };
+        let Ok(handle) = stream.try_clone() else { return };
         let (heard, answering) = (Mutex::new(Instant::now()), AtomicBool::new(false));
-        let client = Arc::new(Client { number, stream: own, heard, answering });
+        let client = Arc::new(Client { number, stream: handle, heard, answering });
         {
-            let mut clients = shared.clients.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut clients = shared.clients();
             if clients.len() >= shared.connections {
-                let silent = clients.iter().filter(|client| !client.answering.load(Ordering::SeqCst));
-                match silent.min_by_key(|client| client.heard()) {
-                    Some(silent) => {
-                        silent.stream.shutdown();
-                        let silent = Arc::clone(silent);
-                        clients.retain(|client| !Arc::ptr_eq(client, &silent));
-                        shared.count(REFUSED);
-                    }
-                    None => {
-                        shared.count(REFUSED);
-                        return;
-                    }
-                }
+                shared.count(REFUSED);
+                let silent = clients.iter().enumerate().filter(|(_, client)| !client.answering.load(Ordering::SeqCst));
+                let Some((silent, _)) = silent.min_by_key(|(_, client)| client.heard()) else { return };
+                clients.remove(silent).stream.shutdown();
             }
             clients.push(Arc::clone(&client));
         }
-        let worker = Arc::clone(shared);
-        let guest = Arc::clone(&client);
+        let (worker, own) = (Arc::clone(shared), Arc::clone(&client));
         let spawned = std::thread::Builder::new().name("client".into()).spawn(move || {
             stream.prepare(worker.patience);
-            let mut conversation = Conversation::new(&worker, &guest, stream, from);
+            let mut conversation = Conversation::new(&worker, &own, stream);
             // However it ends, it concerns this client only.
             let _ = match protocol {
                 Protocol::Slmsuite => conversation.slmsuite(),
@@ -289,7 +288,7 @@ impl Shared {
                 Protocol::Local => conversation.local(),
             };
             drop(conversation);
-            worker.forget(&guest);
+            worker.forget(&own);
         });
         if spawned.is_err() {
             shared.forget(&client);
@@ -297,8 +296,11 @@ impl Shared {
     }
 
     fn forget(&self, client: &Arc<Client>) {
-        let mut clients = self.clients.lock().unwrap_or_else(PoisonError::into_inner);
-        clients.retain(|other| !Arc::ptr_eq(other, client));
+        self.clients().retain(|other| !Arc::ptr_eq(other, client));
+    }
+
+    fn clients(&self) -> MutexGuard<'_, Vec<Arc<Client>>> {
+        self.clients.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -3,7 +3,7 @@
 use super::connections::{Client, FRAMES, REFUSED, Shared};
 #[cfg(unix)]
 use super::local::{self, Buffer};
-use super::slmsuite::{Wish, answer, description, hardware};
+use super::slmsuite::{Command, answer, description, hardware};
 use super::stream::Stream;
 use super::{Flip, FrameRequest, SentFrame, slmpy, slmsuite};
 use std::io::{self, ErrorKind, Read, Write};
@@ -24,8 +24,6 @@ pub(super) struct Conversation<'a> {
     shared: &'a Shared,
     client: &'a Client,
     stream: Stream,
-    /// Who it is, in words.
-    from: String,
     /// Whether the connection outlives its frames.
     lasting: bool,
     /// Bytes of it that are held, of the server's budget.
@@ -33,8 +31,8 @@ pub(super) struct Conversation<'a> {
 }
 
 impl<'a> Conversation<'a> {
-    pub(super) fn new(shared: &'a Shared, client: &'a Client, stream: Stream, from: String) -> Self {
-        Self { shared, client, stream, from, lasting: true, held: 0 }
+    pub(super) fn new(shared: &'a Shared, client: &'a Client, stream: Stream) -> Self {
+        Self { shared, client, stream, lasting: true, held: 0 }
     }
 
     /// One line in, one line out.
@@ -49,20 +47,20 @@ impl<'a> Conversation<'a> {
                 return self.reply(answer(Err(error.to_string())).as_bytes());
             }
         };
-        let wish = slmsuite::read(&line, panel, self.shared.calibrated);
+        let command = slmsuite::read(&line, panel, self.shared.calibrated);
         drop(line);
         self.release();
-        let met = match wish {
-            Ok(Wish::Ping) => Ok(hardware(panel)),
-            Ok(Wish::Describe) => Ok(description(panel, self.shared.calibrated)),
-            Ok(Wish::Wait) => Ok(serde_json::Value::Null),
-            Ok(Wish::Show(frame)) => self.show(frame).map(|_| serde_json::Value::Null),
+        let outcome = match command {
+            Ok(Command::Ping) => Ok(hardware(panel)),
+            Ok(Command::Describe) => Ok(description(panel, self.shared.calibrated)),
+            Ok(Command::Wait) => Ok(serde_json::Value::Null),
+            Ok(Command::Show(frame)) => self.show(frame).map(|_| serde_json::Value::Null),
             Err(why) => {
                 self.shared.count(REFUSED);
                 Err(why)
             }
         };
-        self.reply(answer(met).as_bytes())
+        self.reply(answer(outcome).as_bytes())
     }
 
     /// Frame after frame, until the client goes or sends what has no end that can be found.
@@ -132,18 +130,18 @@ impl<'a> Conversation<'a> {
                 }
             };
             self.release();
-            let wish = local::read(&line).and_then(|wish| match wish {
-                local::Wish::Mapped => {
+            let frame = local::read(&line).and_then(|command| match command {
+                local::Command::Mapped => {
                     buffer.unlink();
                     Ok(None)
                 }
-                local::Wish::Show(values) => {
-                    let frame = self.wait_for_room(buffer.bytes()).and_then(|()| buffer.take(values, &shared.panel));
+                local::Command::Show(array) => {
+                    let frame = self.wait_for_room(buffer.bytes()).and_then(|()| buffer.take(array, &shared.panel));
                     self.release();
                     frame.map(Some)
                 }
             });
-            let outcome = match wish {
+            let outcome = match frame {
                 Ok(None) => Ok(local::done()),
                 Ok(Some(frame)) => self.show(frame).map(|flip| local::answer(&flip, arrived)),
                 Err(why) => {
@@ -165,7 +163,6 @@ impl<'a> Conversation<'a> {
         let request = FrameRequest {
             frame,
             arrived: Instant::now(),
-            from: self.from.clone(),
             client: self.lasting.then_some(self.client.number),
             answer,
             abandoned: Arc::clone(&abandoned),

@@ -34,8 +34,10 @@ impl Named for OnClientGone {
 }
 
 /// How the panel is kept.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct KeepSettings {
+#[derive(Clone, Copy, Debug)]
+pub struct KeepSettings<'a> {
+    /// The idle frame, with which the output begins.
+    pub idle: &'a Frame,
     /// What stays when a client goes.
     pub on_client_gone: OnClientGone,
 }
@@ -50,7 +52,8 @@ pub struct Latency {
 }
 
 /// What was served.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
+#[non_exhaustive]
 pub struct KeepReport {
     /// Frames shown for clients.
     pub shown: u64,
@@ -93,12 +96,19 @@ impl Driver {
     }
 
     /// What clients are told of the panel, under `name`.
-    pub fn served(&self, name: &str) -> ServedPanel {
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] when it cannot be a part of a file's name.
+    pub fn served(&self, name: &str) -> Result<ServedPanel> {
+        let fits = |c: char| !c.is_control() && !matches!(c, '/' | '\\' | '\'' | '"');
+        if name.is_empty() || name.len() > 64 || name.starts_with('.') || !name.chars().all(fits) {
+            return Err(Error::parameter("name", format!("`{name}` is no name of up to 64 letters, digits and marks")));
+        }
         let profile = &self.profile;
         // The wavelength at which all levels are one turn: a turn takes fewer of them at a shorter one.
         let levels_for_2pi = profile.drive_curve(self.wavelength).ok().and_then(|(curve, _)| curve.levels_for_2pi());
         let part = levels_for_2pi.map_or(1.0, |levels| levels / profile.levels() as f64);
-        ServedPanel {
+        Ok(ServedPanel {
             name: name.to_owned(),
             width: profile.width as u32,
             height: profile.height as u32,
@@ -108,7 +118,7 @@ impl Driver {
             wavelength: self.wavelength,
             design_wavelength: self.wavelength / part,
             settle_time: profile.settle_time.unwrap_or(0.0),
-        }
+        })
     }
 
     /// A frame whose levels are all the same.
@@ -141,9 +151,7 @@ impl Driver {
             }
         }
     }
-}
 
-impl Driver {
     /// What [`drive`] makes of a phase, without its figures: fast enough for a panel's rate.
     fn by_table(&self, table: &NearestTable, phase: &[f32]) -> Result<Frame> {
         let Grid { width, height, .. } = self.grid;
@@ -151,8 +159,8 @@ impl Driver {
             let what = format!("{} values for the {width}×{height} pixels of {}", phase.len(), self.profile.name);
             return Err(Error::parameter("pattern", what));
         }
-        let bend = self.correction.as_ref().map(|correction| correction.phase.as_slice());
-        let levels = table.levels(phase, bend).map_err(|i| {
+        let error = self.correction.as_ref().map(|correction| correction.phase.as_slice());
+        let levels = table.levels(phase, error).map_err(|i| {
             let what = format!("the value at column {}, row {} is not finite", i % width, i / width);
             Error::parameter("pattern", what)
         })?;
@@ -169,7 +177,7 @@ impl Driver {
 /// Keeps a panel and shows on it what the clients of `server` send, until the user ends it at the panel, or `progress`
 /// does.
 ///
-/// `output` shows `idle` already. A client's last frame stays until another comes, or as `settings` say. While the monitor
+/// `output` shows [`KeepSettings::idle`] already. A client's last frame stays until another comes, or as `settings` say. While the monitor
 /// is away clients are told so, and nothing is shown.
 ///
 /// # Errors
@@ -178,19 +186,11 @@ impl Driver {
 pub fn keep(
     server: &Server,
     output: &mut dyn Output,
-    (driver, idle): (&Driver, &Frame),
-    settings: KeepSettings,
+    driver: &Driver,
+    settings: KeepSettings<'_>,
     progress: &Progress,
 ) -> Result<KeepReport> {
-    let mut report = KeepReport {
-        shown: 0,
-        failed: 0,
-        idled: 0,
-        missed: 0,
-        latency: Latency::default(),
-        counts: ServeCounts::default(),
-        closed: false,
-    };
+    let mut report = KeepReport::default();
     // The client whose frame is on the panel.
     let mut owner = None;
     let mut waited = Duration::ZERO;
@@ -204,7 +204,7 @@ pub fn keep(
             owner = None;
             report.idled += 1;
             // Where it is refused the monitor is away; the output keeps it for its return.
-            let _ = output.show(idle);
+            let _ = output.show(settings.idle);
         }
         let Some(mut request) = server.next(TURN) else { continue };
         let (arrived, client) = (request.arrived(), request.client());
@@ -250,9 +250,9 @@ mod tests {
                     coefficients = [0.1, 5.0, 0.9]\n";
         let profile = PanelProfile::parse(text, Path::new("t.toml")).expect("profile");
         let phase: Vec<f32> = (0..61 * 37).map(|i| 0.37 * i as f32 - 300.0).collect();
-        let bend = (0..61 * 37).map(|i| (i % 61) as f32 * 0.21).collect();
-        let bend = Wavefront::new("bend", 61, 37, Some(532e-9), bend).expect("wavefront");
-        for correction in [None, Some(bend)] {
+        let error = (0..61 * 37).map(|i| (i % 61) as f32 * 0.21).collect();
+        let error = Wavefront::new("flatness", 61, 37, Some(532e-9), error).expect("wavefront");
+        for correction in [None, Some(error)] {
             let driver = Driver::new(&profile, 532e-9, correction.clone()).expect("driver");
             let frame = driver.frame(SentFrame::Values(phase.clone())).expect("frame");
             let pattern = PhasePattern::new(profile.grid().expect("grid"), 532e-9, phase.clone()).expect("pattern");
@@ -260,7 +260,9 @@ mod tests {
             assert_eq!(frame.levels, driven.levels);
             assert_eq!(frame.metadata.applied, driven.metadata.applied);
             // 5.9 of 6.28 rad over the levels: all of them are less than a turn.
-            let part = driver.served("t").wavelength / driver.served("t").design_wavelength;
+            let served = driver.served("t").expect("name");
+            let part = served.wavelength / served.design_wavelength;
+            assert!(driver.served("../t").is_err() && driver.served("").is_err());
             assert!(part > 1.0 && part < 1.2, "{part}");
             let wrong = driver.frame(SentFrame::Values(vec![f32::NAN; 61 * 37])).expect_err("not finite").to_string();
             assert!(wrong.contains("column 0, row 0"), "{wrong}");

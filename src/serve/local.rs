@@ -28,11 +28,12 @@
 //! or a pipe that never answers. The values are copied once before they are looked at, so that a client which goes on
 //! writing spoils its own frame only.
 
-use super::clock::{monotonic_seconds, user};
+use super::clock::monotonic_seconds;
 use super::{Flip, SentFrame, ServedPanel};
 use crate::error::{Error, Result};
 use crate::panel::Modulation;
 use rayon::prelude::*;
+use rustix::process::geteuid;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
@@ -58,20 +59,20 @@ static BUFFERS: AtomicU64 = AtomicU64::new(0);
 
 /// The folder in which servers of this user have their sockets: `$XDG_RUNTIME_DIR/holodrive`, or a folder of the user's
 /// own among the temporary files.
-pub fn runtime_folder() -> PathBuf {
+pub(super) fn runtime_folder() -> PathBuf {
     match std::env::var_os("XDG_RUNTIME_DIR").filter(|folder| Path::new(folder).is_absolute()) {
         Some(folder) => Path::new(&folder).join("holodrive"),
-        None => PathBuf::from(format!("/tmp/holodrive-{}", user())),
+        None => PathBuf::from(format!("/tmp/holodrive-{}", geteuid().as_raw())),
     }
 }
 
 /// A socket that is ours, and the folder that it is in.
-pub(super) struct Place {
+pub(super) struct LocalSocket {
     socket: PathBuf,
     folder: PathBuf,
 }
 
-impl Place {
+impl LocalSocket {
     /// Makes the folder, where it is not there, and the socket in it.
     ///
     /// # Errors
@@ -87,16 +88,15 @@ impl Place {
         // In a folder that others may write in, they could put a socket of theirs in the place of ours.
         let about = fs::symlink_metadata(&folder).map_err(Error::io(&folder))?;
         let private = folder == runtime_folder();
-        if private && (!about.is_dir() || about.uid() != user() || about.mode() & 0o022 != 0) {
+        if private && (!about.is_dir() || about.uid() != geteuid().as_raw() || about.mode() & 0o022 != 0) {
             let what = format!("{} is not a folder that only you can write in; remove it", folder.display());
             return Err(Error::Display { what });
         }
         if fs::symlink_metadata(socket).is_ok() {
             if UnixStream::connect(socket).is_ok() {
-                let what = format!(
-                    "{} is another server's; end that one, or give this one another --name or --local",
-                    socket.display()
-                );
+                let socket = socket.display();
+                let what =
+                    format!("{socket} is another server's; end that one, or give this one another name or socket");
                 return Err(Error::Display { what });
             }
             // Left behind by a server that was killed. Anything but a socket is somebody's file.
@@ -106,9 +106,9 @@ impl Place {
             }
             fs::remove_file(socket).map_err(Error::io(socket))?;
         }
-        let door = UnixListener::bind(socket).map_err(Error::io(socket))?;
+        let listener = UnixListener::bind(socket).map_err(Error::io(socket))?;
         fs::set_permissions(socket, fs::Permissions::from_mode(0o600)).map_err(Error::io(socket))?;
-        Ok((Self { socket: socket.to_path_buf(), folder }, door))
+        Ok((Self { socket: socket.to_path_buf(), folder }, listener))
     }
 
     pub(super) fn socket(&self) -> &Path {
@@ -119,8 +119,8 @@ impl Place {
         &self.folder
     }
 
-    /// Takes the socket away.
-    pub(super) fn leave(&self) {
+    /// Removes the socket.
+    pub(super) fn remove(&self) {
         // One that is gone already is no loss.
         let _ = fs::remove_file(&self.socket);
     }
@@ -158,15 +158,15 @@ impl Buffer {
     }
 
     /// Copies a frame out of it.
-    pub(super) fn take(&self, values: Values, panel: &ServedPanel) -> Result<SentFrame, String> {
+    pub(super) fn take(&self, array: ArrayType, panel: &ServedPanel) -> Result<SentFrame, String> {
         let pixels = panel.pixels();
         let wrong = |wants: &str, has: &str| Err(format!("The panel modulates {has}; it cannot show {wants}."));
-        match (values.kind, panel.modulation) {
-            (Kind::Phase, Modulation::Amplitude) => return wrong("phase", "amplitude"),
-            (Kind::Amplitude, Modulation::Phase) => return wrong("amplitude", "phase"),
+        match (array.quantity, panel.modulation) {
+            (Quantity::Phase, Modulation::Amplitude) => return wrong("phase", "amplitude"),
+            (Quantity::Amplitude, Modulation::Phase) => return wrong("amplitude", "phase"),
             _ => {}
         }
-        Ok(match values.dtype {
+        Ok(match array.dtype {
             Dtype::Uint8 => panel.take(self.read::<u8>(pixels)?.into_iter().map(u16::from).collect())?,
             Dtype::Uint16 => panel.take(self.read(pixels)?)?,
             Dtype::Float32 => SentFrame::Values(self.read(pixels)?),
@@ -174,8 +174,8 @@ impl Buffer {
                 // A phase of many turns is brought to one before it loses its last digits.
                 let turn = |v: f64| (v - TAU * (v / TAU).floor()) as f32;
                 let values_read: Vec<f64> = self.read(pixels)?;
-                SentFrame::Values(match values.kind {
-                    Kind::Phase => values_read.into_par_iter().map(turn).collect(),
+                SentFrame::Values(match array.quantity {
+                    Quantity::Phase => values_read.into_par_iter().map(turn).collect(),
                     _ => values_read.into_iter().map(|v| v as f32).collect(),
                 })
             }
@@ -198,7 +198,7 @@ impl Drop for Buffer {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum Kind {
+enum Quantity {
     Phase,
     Amplitude,
     Levels,
@@ -213,20 +213,20 @@ enum Dtype {
     Float64,
 }
 
-/// What stands in the buffer.
+/// What the array in the buffer is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Values {
-    kind: Kind,
+pub(super) struct ArrayType {
+    quantity: Quantity,
     dtype: Dtype,
 }
 
-/// What a client wants.
+/// What a client says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Wish {
-    /// To say that it has mapped the buffer.
+pub(super) enum Command {
+    /// It has mapped the buffer.
     Mapped,
-    /// To show what is in it.
-    Show(Values),
+    /// What is in the buffer is to be shown.
+    Show(ArrayType),
 }
 
 #[derive(Deserialize)]
@@ -234,20 +234,20 @@ pub(super) enum Wish {
 struct Request {
     #[serde(default)]
     mapped: bool,
-    show: Option<Kind>,
+    show: Option<Quantity>,
     dtype: Option<Dtype>,
 }
 
 /// Reads a request: the line without its end. The error is an answer to the client.
-pub(super) fn read(line: &[u8]) -> Result<Wish, String> {
+pub(super) fn read(line: &[u8]) -> Result<Command, String> {
     let request: Request =
         serde_json::from_slice(line).map_err(|error| format!("The request is not understood: {error}."))?;
     match request {
-        Request { mapped: true, show: None, dtype: None } => Ok(Wish::Mapped),
-        Request { mapped: false, show: Some(kind), dtype: Some(dtype) } => {
+        Request { mapped: true, show: None, dtype: None } => Ok(Command::Mapped),
+        Request { mapped: false, show: Some(quantity), dtype: Some(dtype) } => {
             let levels = matches!(dtype, Dtype::Uint8 | Dtype::Uint16);
-            if levels == (kind == Kind::Levels) {
-                Ok(Wish::Show(Values { kind, dtype }))
+            if levels == (quantity == Quantity::Levels) {
+                Ok(Command::Show(ArrayType { quantity, dtype }))
             } else {
                 Err("Levels are uint8 or uint16; phases and amplitudes are float32 or float64.".into())
             }
@@ -257,9 +257,7 @@ pub(super) fn read(line: &[u8]) -> Result<Wish, String> {
 }
 
 fn line(value: &Value) -> String {
-    let mut text = value.to_string();
-    text.push('\n');
-    text
+    value.to_string() + "\n"
 }
 
 /// The first line to a client.
@@ -322,8 +320,8 @@ mod tests {
         }
     }
 
-    fn values(kind: Kind, dtype: Dtype) -> Values {
-        Values { kind, dtype }
+    fn array(quantity: Quantity, dtype: Dtype) -> ArrayType {
+        ArrayType { quantity, dtype }
     }
 
     #[test]
@@ -333,10 +331,10 @@ mod tests {
         let buffer = Buffer::new(folder.path(), &panel).expect("buffer");
         let levels: Vec<u16> = (0..15).map(|i| i * 73).collect();
         buffer.file.write_all_at(bytemuck::cast_slice(&levels), 0).expect("write");
-        assert_eq!(buffer.take(values(Kind::Levels, Dtype::Uint16), &panel), Ok(SentFrame::Levels(levels)));
+        assert_eq!(buffer.take(array(Quantity::Levels, Dtype::Uint16), &panel), Ok(SentFrame::Levels(levels)));
         let phases: Vec<f64> = (0..15).map(|i| 0.1 + f64::from(i) + 1e6 * TAU * f64::from(i - 7)).collect();
         buffer.file.write_all_at(bytemuck::cast_slice(&phases), 0).expect("write");
-        let Ok(SentFrame::Values(read)) = buffer.take(values(Kind::Phase, Dtype::Float64), &panel) else {
+        let Ok(SentFrame::Values(read)) = buffer.take(array(Quantity::Phase, Dtype::Float64), &panel) else {
             panic!("not read");
         };
         for (i, value) in read.iter().enumerate() {
@@ -346,11 +344,11 @@ mod tests {
         }
         let narrow: Vec<f32> = phases.iter().map(|v| *v as f32).collect();
         buffer.file.write_all_at(bytemuck::cast_slice(&narrow), 0).expect("write");
-        assert_eq!(buffer.take(values(Kind::Phase, Dtype::Float32), &panel), Ok(SentFrame::Values(narrow)));
+        assert_eq!(buffer.take(array(Quantity::Phase, Dtype::Float32), &panel), Ok(SentFrame::Values(narrow)));
         let bytes: Vec<u8> = (200..215).collect();
         buffer.file.write_all_at(&bytes, 0).expect("write");
         let wanted = bytes.into_iter().map(u16::from).collect();
-        assert_eq!(buffer.take(values(Kind::Levels, Dtype::Uint8), &panel), Ok(SentFrame::Levels(wanted)));
+        assert_eq!(buffer.take(array(Quantity::Levels, Dtype::Uint8), &panel), Ok(SentFrame::Levels(wanted)));
     }
 
     #[test]
@@ -359,14 +357,14 @@ mod tests {
         let phase = panel(Modulation::Phase);
         let buffer = Buffer::new(folder.path(), &phase).expect("buffer");
         buffer.file.write_all_at(&[0xFF; 30], 0).expect("write");
-        let why = buffer.take(values(Kind::Levels, Dtype::Uint16), &phase).expect_err("levels of 16 bits");
+        let why = buffer.take(array(Quantity::Levels, Dtype::Uint16), &phase).expect_err("levels of 16 bits");
         assert!(why.contains("1023"), "{why}");
-        let why = buffer.take(values(Kind::Amplitude, Dtype::Float32), &phase).expect_err("a phase panel");
+        let why = buffer.take(array(Quantity::Amplitude, Dtype::Float32), &phase).expect_err("a phase panel");
         assert!(why.contains("modulates phase"), "{why}");
-        let why = buffer.take(values(Kind::Phase, Dtype::Float32), &panel(Modulation::Amplitude));
+        let why = buffer.take(array(Quantity::Phase, Dtype::Float32), &panel(Modulation::Amplitude));
         assert!(why.expect_err("an amplitude panel").contains("modulates amplitude"));
         buffer.file.set_len(59).expect("cut");
-        let why = buffer.take(values(Kind::Phase, Dtype::Float32), &phase).expect_err("15 values of 4 bytes");
+        let why = buffer.take(array(Quantity::Phase, Dtype::Float32), &phase).expect_err("15 values of 4 bytes");
         assert!(why.contains("shared file"), "{why}");
         drop(buffer);
         assert_eq!(fs::read_dir(folder.path()).expect("list").count(), 0);
@@ -375,9 +373,9 @@ mod tests {
     #[test]
     fn requests_are_read_and_others_answered() {
         let ask = |text: &str| read(text.as_bytes());
-        let wanted = Values { kind: Kind::Phase, dtype: Dtype::Float32 };
-        assert_eq!(ask(r#"{"show": "phase", "dtype": "float32"}"#), Ok(Wish::Show(wanted)));
-        assert_eq!(ask(r#"{"mapped": true}"#), Ok(Wish::Mapped));
+        let wanted = array(Quantity::Phase, Dtype::Float32);
+        assert_eq!(ask(r#"{"show": "phase", "dtype": "float32"}"#), Ok(Command::Show(wanted)));
+        assert_eq!(ask(r#"{"mapped": true}"#), Ok(Command::Mapped));
         for wrong in [
             "",
             "{}",
@@ -397,19 +395,19 @@ mod tests {
     fn a_socket_is_taken_once_and_a_dead_ones_is_taken_over() {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("own").join("panel.sock");
-        let (place, door) = Place::take(&path).expect("socket");
+        let (place, listener) = LocalSocket::take(&path).expect("socket");
         let about = fs::metadata(&path).expect("socket");
         assert_eq!(about.mode() & 0o777, 0o600);
         assert_eq!(fs::metadata(place.folder()).expect("folder").mode() & 0o777, 0o700);
-        let why = Place::take(&path).err().expect("taken").to_string();
+        let why = LocalSocket::take(&path).err().expect("taken").to_string();
         assert!(why.contains("another server"), "{why}");
         // As a killed server leaves it.
-        drop(door);
-        let (place, _door) = Place::take(&path).expect("taken over");
-        place.leave();
+        drop(listener);
+        let (place, _listener) = LocalSocket::take(&path).expect("taken over");
+        place.remove();
         assert!(!path.exists());
         fs::write(&path, "a file").expect("write");
-        assert!(Place::take(&path).is_err());
+        assert!(LocalSocket::take(&path).is_err());
         assert!(path.exists(), "somebody's file was removed");
     }
 

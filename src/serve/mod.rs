@@ -1,5 +1,5 @@
 //! Frames from other programs: a server that speaks slmsuite's and slmPy's protocols, and one of its own for programs on
-//! the same machine ([`local`]; Python's side of it is `holodrive.py` beside this file, [`PYTHON`]).
+//! the same machine (Python's side of it is `holodrive.py` beside this file, [`PYTHON`]).
 //!
 //! [`Server`] only takes frames and answers; whoever runs it owns the panel, takes each frame by [`Server::next`], shows
 //! it, and says so by [`FrameRequest::shown`], upon which the client gets its answer. [`keep`] is that for any [`Output`],
@@ -8,14 +8,44 @@
 //! slmsuite's and slmPy's protocols are neither encrypted nor authenticated: an address other than loopback lets the whole
 //! network write on the panel. Whatever a client sends, nothing is held that is longer than a frame of the panel can be;
 //! silent clients are cut off inside a request, and the longest silent one when there are too many.
+//!
+//! ```
+//! use holodrive::panel::PanelProfile;
+//! use holodrive::serve::{Driver, Flip, ServeSettings, Server};
+//! use std::io::{Read, Write};
+//! use std::net::TcpStream;
+//! use std::time::{Duration, Instant};
+//!
+//! let panel = PanelProfile::find("generic")?;
+//! let driver = Driver::new(&panel, 532e-9, None)?;
+//! let free_port = Some(([127, 0, 0, 1], 0).into());
+//! let settings = ServeSettings { slmsuite: None, slmpy: free_port, ..ServeSettings::default() };
+//! let server = Server::start(driver.served("slm")?, &settings)?;
+//! // What a client does: the length of a frame, its levels, and the answer.
+//! let mut client = TcpStream::connect(server.slmpy().expect("asked for"))?;
+//! let levels = vec![7; panel.width * panel.height];
+//! let sender = std::thread::spawn(move || -> std::io::Result<[u8; 4]> {
+//!     client.write_all(&(levels.len() as u32).to_le_bytes())?;
+//!     client.write_all(&levels)?;
+//!     let mut answer = [0; 4];
+//!     client.read_exact(&mut answer)?;
+//!     Ok(answer)
+//! });
+//! // What the panel's keeper does.
+//! let mut request = server.next(Duration::from_secs(5)).expect("a frame");
+//! let frame = driver.frame(request.take_frame())?;
+//! assert!(frame.levels.iter().all(|level| *level == 7));
+//! request.shown(Flip { at: Instant::now(), number: 1, missed: 0 });
+//! assert_eq!(sender.join().expect("no panic")?, *b"done");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod clock;
 mod connections;
 mod conversation;
-mod encoding;
 mod keeping;
 #[cfg(unix)]
-pub mod local;
+mod local;
 mod output;
 mod slmpy;
 mod slmsuite;
@@ -27,6 +57,7 @@ pub use keeping::{Driver, KeepReport, KeepSettings, Latency, OnClientGone, keep}
 pub use output::{Output, Readiness, ShownAt, SimulatedOutput};
 
 use crate::panel::Modulation;
+use serde::Serialize;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -58,6 +89,15 @@ pub struct ServedPanel {
     pub design_wavelength: f64,
     /// Time from a frame's being presented until the panel has settled on it [s].
     pub settle_time: f64,
+}
+
+/// The socket of the local protocol on which clients look for the panel of that name; none where the system has no such
+/// sockets.
+pub fn usual_socket(name: &str) -> Option<PathBuf> {
+    #[cfg(unix)]
+    return Some(local::runtime_folder().join(format!("{name}.sock")));
+    #[cfg(not(unix))]
+    return None;
 }
 
 /// A frame as a client sent it: of the panel's size, row-major, row 0 on top.
@@ -104,8 +144,30 @@ impl Default for ServeSettings {
     }
 }
 
+/// What clients have to know to find a server: the panel and where each protocol is spoken.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Announcement {
+    /// The name by which clients ask for the panel.
+    pub name: String,
+    /// Columns [px].
+    pub width: u32,
+    /// Rows [px].
+    pub height: u32,
+    /// Bits of a drive level.
+    pub bits: u8,
+    /// The wavelength in use [m].
+    pub wavelength: f64,
+    /// Address of slmsuite's protocol.
+    pub slmsuite: Option<SocketAddr>,
+    /// Address of slmPy's protocol.
+    pub slmpy: Option<SocketAddr>,
+    /// Socket of the local protocol.
+    pub local: Option<PathBuf>,
+}
+
 /// What has come in so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ServeCounts {
     /// Connections taken.
     pub connections: u64,
@@ -131,7 +193,6 @@ pub struct Flip {
 pub struct FrameRequest {
     frame: SentFrame,
     arrived: Instant,
-    from: String,
     client: Option<u64>,
     answer: SyncSender<Result<Flip, String>>,
     /// Set once the client was told that it has waited too long.
@@ -152,11 +213,6 @@ impl FrameRequest {
     /// When all of it had come.
     pub fn arrived(&self) -> Instant {
         self.arrived
-    }
-
-    /// Who sent it: an address of the network, or `local`.
-    pub fn from(&self) -> &str {
-        &self.from
     }
 
     /// The number of its client, where a client stays connected after its frame (slmPy's and the local protocol).

@@ -5,9 +5,10 @@
 //! to which neither correction nor look-up table are to be applied again. Where asked for, levels are taken as what slmsuite
 //! makes of a phase φ on an ideal panel of N levels, round(−φ·N/2π) − 1 modulo N, and brought back to that phase.
 
-use super::encoding::{base64, quote_plus, unquote_plus};
 use super::{SentFrame, ServedPanel};
+use base64::prelude::{BASE64_STANDARD, Engine as _};
 use flate2::read::ZlibDecoder;
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_decode, percent_encode};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::{Value, json};
@@ -20,16 +21,19 @@ const VERSION: &str = "0.5.0";
 /// Bytes of a request beside its frame.
 const HEAD: usize = 64 * 1024;
 
-/// What a client wants.
+/// What Python's `quote_plus` encodes, which makes a space `+`.
+const QUOTED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'_').remove(b'.').remove(b'-').remove(b'~').remove(b' ');
+
+/// What a client asks for.
 #[derive(Debug, PartialEq)]
-pub(super) enum Wish {
-    /// To know what there is.
+pub(super) enum Command {
+    /// What there is.
     Ping,
-    /// To know the panel.
+    /// What the panel is.
     Describe,
-    /// To know that the last frame is on the panel, without showing another (`execute=False`).
+    /// Whether the last frame is on the panel, without another's being shown (`execute=False`).
     Wait,
-    /// To show a frame.
+    /// A frame to be shown.
     Show(SentFrame),
 }
 
@@ -41,17 +45,17 @@ struct Request {
     #[serde(default, rename = "args")]
     _args: Option<IgnoredAny>,
     #[serde(default)]
-    kwargs: Option<Named>,
+    kwargs: Option<Arguments>,
 }
 
 #[derive(Deserialize)]
-struct Named {
-    display: Option<Packed>,
+struct Arguments {
+    display: Option<Array>,
     execute: Option<bool>,
 }
 
 #[derive(Deserialize)]
-struct Packed {
+struct Array {
     #[serde(rename = "__zlib__")]
     zlib: String,
     #[serde(rename = "__shape__")]
@@ -68,28 +72,29 @@ pub(super) fn request_limit(panel: &ServedPanel) -> usize {
 }
 
 /// Reads a request: the line without its end. `calibrated`: levels stand for phases. The error is an answer to the client.
-pub(super) fn read(line: &[u8], panel: &ServedPanel, calibrated: bool) -> Result<Wish, String> {
-    let plain = unquote_plus(line).ok_or("The request is not percent-encoded.")?;
+pub(super) fn read(line: &[u8], panel: &ServedPanel, calibrated: bool) -> Result<Command, String> {
+    let spaced: Vec<u8> = line.iter().map(|&byte| if byte == b'+' { b' ' } else { byte }).collect();
+    let plain: Vec<u8> = percent_decode(&spaced).collect();
     let request: Request =
         serde_json::from_slice(&plain).map_err(|error| format!("The request is not understood: {error}."))?;
     let command = request.command.ok_or("No command provided.")?;
     if command == "ping" {
-        return Ok(Wish::Ping);
+        return Ok(Command::Ping);
     }
     let name = request.name.unwrap_or_default();
     if name != panel.name {
         return Err(format!("Did not recognize hardware '{name}'. Options: ['{}'].", panel.name));
     }
     match command.as_str() {
-        "pickle" => Ok(Wish::Describe),
+        "pickle" => Ok(Command::Describe),
         "_set_phase_hw" => {
             let named = request.kwargs.ok_or("_set_phase_hw carries no display.")?;
             if named.execute == Some(false) {
-                return Ok(Wish::Wait);
+                return Ok(Command::Wait);
             }
             let packed = named.display.ok_or("_set_phase_hw carries no display.")?;
             let levels = unpack(&packed, panel)?;
-            Ok(Wish::Show(if calibrated { phases(levels, panel.bits) } else { levels }))
+            Ok(Command::Show(if calibrated { phases(levels, panel.bits) } else { levels }))
         }
         _ => Err(format!("{name}.{command} not present.")),
     }
@@ -107,7 +112,7 @@ fn phases(frame: SentFrame, bits: u8) -> SentFrame {
     }
 }
 
-fn unpack(packed: &Packed, panel: &ServedPanel) -> Result<SentFrame, String> {
+fn unpack(packed: &Array, panel: &ServedPanel) -> Result<SentFrame, String> {
     if packed.shape != [u64::from(panel.height), u64::from(panel.width)] {
         let (width, height) = (panel.width, panel.height);
         return Err(format!("The display is of shape {:?}, the panel of [{height}, {width}].", packed.shape));
@@ -117,7 +122,7 @@ fn unpack(packed: &Packed, panel: &ServedPanel) -> Result<SentFrame, String> {
         "uint16" => 2,
         other => return Err(format!("The display is of type {other}; uint8 and uint16 are taken.")),
     };
-    let zlib = base64(packed.zlib.as_bytes()).ok_or("The display is not in base64.")?;
+    let zlib = BASE64_STANDARD.decode(&packed.zlib).map_err(|_| "The display is not in base64.")?;
     let expected = panel.pixels() * bytes_of_level;
     let mut bytes = Vec::with_capacity(expected);
     // One byte more than expected shows that there is too much, whatever a small text would unfold to.
@@ -132,15 +137,17 @@ fn unpack(packed: &Packed, panel: &ServedPanel) -> Result<SentFrame, String> {
     panel.take(levels)
 }
 
-/// The answer to a wish that was met, or the reason why not, as the line to send.
-pub(super) fn answer(met: Result<Value, String>) -> String {
-    let reply = match met {
+/// The answer to a command that was carried out, or the reason why not, as the line to send.
+pub(super) fn answer(outcome: Result<Value, String>) -> String {
+    let reply = match outcome {
         Ok(value) => json!([true, value]),
         Err(why) => json!([false, why]),
     };
-    let mut line = quote_plus(reply.to_string().as_bytes());
-    line.push('\n');
-    line
+    quote_plus(&reply.to_string()) + "\n"
+}
+
+fn quote_plus(plain: &str) -> String {
+    percent_encode(plain.as_bytes(), QUOTED).to_string().replace(' ', "+")
 }
 
 /// The answer to `ping`.
@@ -198,37 +205,30 @@ mod tests {
         }
     }
 
-    /// Base64 by the rule, bit by bit.
-    fn to_base64(bytes: &[u8]) -> String {
-        const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-        let bit = |i: usize| bytes.get(i / 8).map_or(0, |byte| byte >> (7 - i % 8) & 1);
-        let letters = (bytes.len() * 8).div_ceil(6);
-        let mut text: String = (0..letters)
-            .map(|letter| char::from(LETTERS[(0..6).fold(0, |value, i| value << 1 | usize::from(bit(6 * letter + i)))]))
-            .collect();
-        while !text.len().is_multiple_of(4) {
-            text.push('=');
-        }
-        text
-    }
-
     fn packed(bytes: &[u8]) -> String {
         let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
         encoder.write_all(bytes).expect("memory");
-        to_base64(&encoder.finish().expect("memory"))
+        BASE64_STANDARD.encode(encoder.finish().expect("memory"))
     }
 
     fn request(shape: &str, dtype: &str, zlib: &str) -> String {
         let json = format!(
             r#"{{"name": "panel", "command": "_set_phase_hw", "args": [], "kwargs": {{"display": {{"__zlib__": "{zlib}", "__shape__": {shape}, "__dtype__": "{dtype}"}}, "block": true}}}}"#
         );
-        quote_plus(json.as_bytes())
+        quote_plus(&json)
+    }
+
+    #[test]
+    fn text_is_quoted_as_python_does_it() {
+        // Python: urllib.parse.quote_plus('{"a": [1, "é/~"]}').
+        let (plain, quoted) = ("{\"a\": [1, \"é/~\"]}", "%7B%22a%22%3A+%5B1%2C+%22%C3%A9%2F~%22%5D%7D");
+        assert_eq!(quote_plus(plain), quoted);
     }
 
     #[test]
     fn frames_of_both_widths_are_read() {
         let bytes: Vec<u8> = (0..15).map(|i| i * 17).collect();
-        let Ok(Wish::Show(SentFrame::Levels(sent))) =
+        let Ok(Command::Show(SentFrame::Levels(sent))) =
             read(request("[3, 5]", "uint8", &packed(&bytes)).as_bytes(), &panel(), false)
         else {
             panic!("not read");
@@ -236,7 +236,7 @@ mod tests {
         assert!(sent.iter().zip(&bytes).all(|(level, byte)| *level == u16::from(*byte)));
         let words: Vec<u16> = (0..15).map(|i| i * 73).collect();
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-        let Ok(Wish::Show(SentFrame::Levels(sent))) =
+        let Ok(Command::Show(SentFrame::Levels(sent))) =
             read(request("[3, 5]", "uint16", &packed(&bytes)).as_bytes(), &panel(), false)
         else {
             panic!("not read");
@@ -248,22 +248,22 @@ mod tests {
     fn levels_are_brought_back_to_slmsuites_phases() {
         // What `SLM._phase2gray` does with a phase, where one turn takes all levels.
         let gray = |phase: f64| ((-phase * 1024.0 / TAU).round_ties_even() as i64 - 1).rem_euclid(1024) as u16;
-        let wished: Vec<f64> = (0..15).map(|i| f64::from(i) * 0.4187).collect();
-        let words: Vec<u8> = wished.iter().flat_map(|phase| gray(*phase).to_le_bytes()).collect();
+        let wanted: Vec<f64> = (0..15).map(|i| f64::from(i) * 0.4187).collect();
+        let words: Vec<u8> = wanted.iter().flat_map(|phase| gray(*phase).to_le_bytes()).collect();
         let line = request("[3, 5]", "uint16", &packed(&words));
-        let Ok(Wish::Show(SentFrame::Values(sent))) = read(line.as_bytes(), &panel(), true) else {
+        let Ok(Command::Show(SentFrame::Values(sent))) = read(line.as_bytes(), &panel(), true) else {
             panic!("not read");
         };
-        for (sent, wished) in sent.iter().zip(wished) {
+        for (sent, wanted) in sent.iter().zip(wanted) {
             // Half a level of rounding, and f32.
-            assert!((f64::from(*sent) - wished).abs() < 0.5 * TAU / 1024.0 + 1e-6, "{sent} {wished}");
+            assert!((f64::from(*sent) - wanted).abs() < 0.5 * TAU / 1024.0 + 1e-6, "{sent} {wanted}");
         }
     }
 
     #[test]
     fn a_frame_that_is_not_to_be_executed_is_not_shown() {
         let line = request("[3, 5]", "uint8", &packed(&[7; 15])).replace("block", "execute").replace("true", "false");
-        assert_eq!(read(line.as_bytes(), &panel(), false), Ok(Wish::Wait));
+        assert_eq!(read(line.as_bytes(), &panel(), false), Ok(Command::Wait));
     }
 
     #[test]
@@ -282,11 +282,11 @@ mod tests {
             (request("[3, 5]", "uint8", "!!!!"), "base64"),
             (request("[3, 5]", "uint16", &packed(&above)), "1023"),
             ("%7B".into(), "understood"),
-            ("%zz".into(), "percent"),
-            (quote_plus(br#"{"name": "panel"}"#), "command"),
-            (quote_plus(br#"{"name": "other", "command": "pickle"}"#), "recognize"),
-            (quote_plus(br#"{"name": "panel", "command": "__init__"}"#), "not present"),
-            (quote_plus(br#"{"name": "panel", "command": "_set_phase_hw", "kwargs": {}}"#), "no display"),
+            ("%zz".into(), "understood"),
+            (quote_plus(r#"{"name": "panel"}"#), "command"),
+            (quote_plus(r#"{"name": "other", "command": "pickle"}"#), "recognize"),
+            (quote_plus(r#"{"name": "panel", "command": "__init__"}"#), "not present"),
+            (quote_plus(r#"{"name": "panel", "command": "_set_phase_hw", "kwargs": {}}"#), "no display"),
         ] {
             let why = read(line.as_bytes(), &panel(), false).expect_err(word);
             assert!(why.contains(word), "{word}: {why}");
@@ -299,10 +299,10 @@ mod tests {
             let json = format!(
                 r#"{{"name": "panel", "command": "{command}", "args": [], "kwargs": {{"attributes": false}}}}"#
             );
-            read(quote_plus(json.as_bytes()).as_bytes(), &panel(), false)
+            read(quote_plus(&json).as_bytes(), &panel(), false)
         };
-        assert_eq!(ask("ping"), Ok(Wish::Ping));
-        assert_eq!(ask("pickle"), Ok(Wish::Describe));
+        assert_eq!(ask("ping"), Ok(Command::Ping));
+        assert_eq!(ask("pickle"), Ok(Command::Describe));
         assert_eq!(answer(Ok(hardware(&panel()))), "%5Btrue%2C%7B%22panel%22%3A%22slm%22%7D%5D\n");
         let meta = &description(&panel(), false)["__meta__"];
         assert_eq!(meta["shape"], json!([3, 5]));
