@@ -1,27 +1,78 @@
 //! Two-dimensional discrete Fourier transforms: the only place that normalises.
 //!
 //! Forward: U(k) = Σ u(n)·exp(−i2πkn/N), no factor. Inverse: exp(+i2πkn/N) and 1/(width·height). Row-major.
+//!
+//! ```
+//! use holodrive::field::{Complex64, Fft2, Grid};
+//! use holodrive::progress::Progress;
+//!
+//! // A plane wave of frequency (f_x, f_y) has its whole spectrum in the sample of that frequency.
+//! let grid = Grid::new(16, 12, 8e-6, 8e-6)?;
+//! let (fx, fy) = (grid.frequency_x(3), grid.frequency_y(10));
+//! let wave = |i: usize| (fx * grid.x(i % 16) + fy * grid.y(i / 16)) * std::f64::consts::TAU;
+//! let mut samples: Vec<Complex64> = (0..grid.len()).map(|i| Complex64::cis(wave(i))).collect();
+//! Fft2::new(16, 12).forward(&mut samples, &Progress::new());
+//! for (i, u) in samples.iter().enumerate() {
+//!     assert!((u.norm() - if i == 10 * 16 + 3 { 192.0 } else { 0.0 }).abs() < 1e-10);
+//! }
+//! # Ok::<(), holodrive::Error>(())
+//! ```
 
 use crate::progress::Progress;
 use num_complex::Complex;
 use rayon::prelude::*;
-use rustfft::{Fft, FftNum, FftPlanner};
+pub use rustfft::FftNum;
+use rustfft::{Fft, FftPlanner};
 use std::any::{Any, TypeId};
 use std::collections::HashMap;
 use std::sync::{Arc, LazyLock, Mutex};
 
-/// Forward and inverse transforms of a length; each length is planned once in the life of the process.
-///
-/// Forward: exp(−i2πkn/N), inverse: exp(+i2πkn/N), neither with a factor.
-pub fn plans<T: FftNum>(length: usize) -> [Arc<dyn Fft<T>>; 2] {
-    /// A planner of each precision; it keeps its plans.
-    static PLANNERS: LazyLock<Mutex<HashMap<TypeId, Box<dyn Any + Send>>>> = LazyLock::new(Mutex::default);
-    // A thread that panicked while it planned left the planner as it was.
-    let mut planners = PLANNERS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    let planner = planners.entry(TypeId::of::<T>()).or_insert_with(|| Box::new(FftPlanner::<T>::new()));
-    let mut fresh = FftPlanner::new();
-    let planner = planner.downcast_mut::<FftPlanner<T>>().unwrap_or(&mut fresh);
-    [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)]
+/// Planned transforms of lines of one length, neither direction with a factor; usable from any number of threads.
+#[derive(Clone)]
+pub struct Fft1<T: FftNum> {
+    forward: Arc<dyn Fft<T>>,
+    inverse: Arc<dyn Fft<T>>,
+}
+
+impl<T: FftNum> std::fmt::Debug for Fft1<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Fft1 {}", self.len())
+    }
+}
+
+impl<T: FftNum> Fft1<T> {
+    /// Transforms of a length; each length is planned once in the life of the process.
+    pub fn new(length: usize) -> Self {
+        /// A planner of each precision; it keeps its plans.
+        static PLANNERS: LazyLock<Mutex<HashMap<TypeId, Box<dyn Any + Send>>>> = LazyLock::new(Mutex::default);
+        // A thread that panicked while it planned left the planner as it was.
+        let mut planners = PLANNERS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let planner = planners.entry(TypeId::of::<T>()).or_insert_with(|| Box::new(FftPlanner::<T>::new()));
+        let mut fresh = FftPlanner::new();
+        let planner = planner.downcast_mut::<FftPlanner<T>>().unwrap_or(&mut fresh);
+        Self { forward: planner.plan_fft_forward(length), inverse: planner.plan_fft_inverse(length) }
+    }
+    /// Samples of a line.
+    #[allow(clippy::len_without_is_empty)] // a line has at least one sample
+    pub fn len(&self) -> usize {
+        self.forward.len()
+    }
+    /// `count` dark samples.
+    pub fn dark(count: usize) -> Vec<Complex<T>> {
+        vec![Complex::new(T::zero(), T::zero()); count]
+    }
+    /// Memory that a thread's transforms need, in either direction.
+    pub fn scratch(&self) -> Vec<Complex<T>> {
+        Self::dark(self.forward.get_inplace_scratch_len().max(self.inverse.get_inplace_scratch_len()))
+    }
+    /// Σ u(n)·exp(−i2πkn/N) of each line, in place.
+    pub fn forward(&self, lines: &mut [Complex<T>], scratch: &mut [Complex<T>]) {
+        self.forward.process_with_scratch(lines, scratch);
+    }
+    /// Σ u(n)·exp(+i2πkn/N) of each line, in place, without 1/N.
+    pub fn inverse(&self, lines: &mut [Complex<T>], scratch: &mut [Complex<T>]) {
+        self.inverse.process_with_scratch(lines, scratch);
+    }
 }
 
 /// The smallest `step`·2^a·3^b·5^c, times one of `others`, that is not below `least`: lengths that transforms are fast at.
@@ -51,8 +102,8 @@ const STRIP: usize = 16;
 pub struct Fft2<T: FftNum> {
     width: usize,
     height: usize,
-    row: [Arc<dyn Fft<T>>; 2],
-    column: [Arc<dyn Fft<T>>; 2],
+    row: Fft1<T>,
+    column: Fft1<T>,
 }
 
 impl<T: FftNum> std::fmt::Debug for Fft2<T> {
@@ -64,21 +115,21 @@ impl<T: FftNum> std::fmt::Debug for Fft2<T> {
 impl<T: FftNum> Fft2<T> {
     /// Plans transforms of `width × height` samples.
     pub fn new(width: usize, height: usize) -> Self {
-        Self { width, height, row: plans(width), column: plans(height) }
+        Self { width, height, row: Fft1::new(width), column: Fft1::new(height) }
     }
 
     /// Σ u·exp(−i2π(…)), in place.
     pub fn forward(&self, samples: &mut [Complex<T>], progress: &Progress) {
-        self.rows(samples, 0, self.height, progress);
-        self.columns(samples, progress, |plan, _, strip, scratch| plan.column[0].process_with_scratch(strip, scratch));
+        self.rows(samples, Fft1::forward, self.height, progress);
+        self.columns(samples, progress, |plan, _, strip, scratch| plan.column.forward(strip, scratch));
     }
 
     /// (1/N) Σ u·exp(+i2π(…)), in place.
     pub fn inverse(&self, samples: &mut [Complex<T>], progress: &Progress) {
-        self.rows(samples, 1, self.height, progress);
+        self.rows(samples, Fft1::inverse, self.height, progress);
         let scale = self.scale();
         self.columns(samples, progress, |plan, _, strip, scratch| {
-            plan.column[1].process_with_scratch(strip, scratch);
+            plan.column.inverse(strip, scratch);
             for u in strip {
                 *u = u.scale(scale);
             }
@@ -98,10 +149,10 @@ impl<T: FftNum> Fft2<T> {
         transfer: impl Fn(usize, &mut [Complex<T>]) + Sync,
         progress: &Progress,
     ) {
-        self.rows(samples, 0, filled_rows, progress);
+        self.rows(samples, Fft1::forward, filled_rows, progress);
         let scale = self.scale();
         self.columns(samples, progress, |plan, first, strip, scratch| {
-            plan.column[0].process_with_scratch(strip, scratch);
+            plan.column.forward(strip, scratch);
             if progress.stopped() {
                 return;
             }
@@ -111,9 +162,9 @@ impl<T: FftNum> Fft2<T> {
                     *u = u.scale(scale);
                 }
             }
-            plan.column[1].process_with_scratch(strip, scratch);
+            plan.column.inverse(strip, scratch);
         });
-        self.rows(samples, 1, wanted_rows, progress);
+        self.rows(samples, Fft1::inverse, wanted_rows, progress);
     }
 
     fn scale(&self) -> T {
@@ -121,16 +172,21 @@ impl<T: FftNum> Fft2<T> {
         T::one() / count
     }
 
-    fn rows(&self, samples: &mut [Complex<T>], direction: usize, rows: usize, progress: &Progress) {
+    fn rows(
+        &self,
+        samples: &mut [Complex<T>],
+        transform: impl Fn(&Fft1<T>, &mut [Complex<T>], &mut [Complex<T>]) + Sync,
+        rows: usize,
+        progress: &Progress,
+    ) {
         assert_eq!(samples.len(), self.width * self.height, "samples fit the planned size");
-        let plan = &self.row[direction];
         let rows = &mut samples[..rows * self.width];
         // A task of several rows amortises its scratch; the split does not change any row's result.
         rows.par_chunks_mut(self.width * STRIP).for_each_init(
-            || vec![Complex::new(T::zero(), T::zero()); plan.get_inplace_scratch_len()],
+            || self.row.scratch(),
             |scratch, rows| {
                 if !progress.stopped() {
-                    plan.process_with_scratch(rows, scratch);
+                    transform(&self.row, rows, scratch);
                 }
             },
         );
@@ -147,12 +203,10 @@ impl<T: FftNum> Fft2<T> {
         if progress.stopped() {
             return;
         }
-        let zero = Complex::new(T::zero(), T::zero());
-        let scratch = self.column.iter().map(|plan| plan.get_inplace_scratch_len()).max().unwrap_or(0);
-        let mut turned = vec![zero; width * height];
+        let mut turned = Fft1::dark(width * height);
         let source = &*samples;
         turned.par_chunks_mut(height * STRIP).enumerate().for_each_init(
-            || vec![zero; scratch],
+            || self.column.scratch(),
             |scratch, (strip, columns)| {
                 if progress.stopped() {
                     return;

@@ -1,4 +1,18 @@
-//! The only code that turns sample indexes into metres and cycles per metre.
+//! The only code that turns sample indexes into metres and cycles per metre. (Quadratures over frequency have steps of
+//! their own.)
+//!
+//! ```
+//! use holodrive::field::Grid;
+//!
+//! let grid = Grid::new(1920, 1080, 8e-6, 8e-6)?;
+//! // Centred, row 0 on top; pixels are cells about their samples.
+//! assert!((grid.x(0) + 959.5 * 8e-6).abs() < 1e-15 && grid.y(0) > grid.y(1));
+//! assert_eq!(grid.column(grid.x(7)), 7.0);
+//! // Transform column 1 has one cycle over the panel; the last one runs the other way.
+//! assert_eq!(grid.frequency_x(1), 1.0 / grid.extent_x());
+//! assert_eq!(grid.frequency_x(1919), -grid.frequency_x(1));
+//! # Ok::<(), holodrive::Error>(())
+//! ```
 
 use crate::error::{Error, Result};
 
@@ -47,13 +61,27 @@ impl Grid {
     pub fn len(&self) -> usize {
         self.width * self.height
     }
+    /// Pixel pitch along x and y [m].
+    pub fn pitch(&self) -> [f64; 2] {
+        [self.pitch_x, self.pitch_y]
+    }
     /// Position of a column [m].
     pub fn x(&self, column: usize) -> f64 {
-        self.center[0] + (column as f64 - (self.width as f64 - 1.0) * 0.5) * self.pitch_x
+        self.center[0] + offset(column as f64, self.width as f64, self.pitch_x)
     }
     /// Position of a row [m]; falls as the row rises.
     pub fn y(&self, row: usize) -> f64 {
-        self.center[1] + ((self.height as f64 - 1.0) * 0.5 - row as f64) * self.pitch_y
+        self.center[1] - offset(row as f64, self.height as f64, self.pitch_y)
+    }
+    /// Middle of the block of `size` columns and rows whose first are `at`; it may overhang the lattice [m].
+    pub fn middle(&self, at: [usize; 2], size: [usize; 2]) -> [f64; 2] {
+        let half = size.map(|size| 0.5 * (size as f64 - 1.0));
+        [self.x(at[0]) + half[0] * self.pitch_x, self.y(at[1]) - half[1] * self.pitch_y]
+    }
+    /// Lowest and highest x, and y, of the outermost pixels' edges [m].
+    pub fn edges(&self) -> [[f64; 2]; 2] {
+        let (x, y) = (0.5 * self.pitch_x, 0.5 * self.pitch_y);
+        [[self.x(0) - x, self.x(self.width - 1) + x], [self.y(self.height - 1) - y, self.y(0) + y]]
     }
     /// The (fractional) column that stands at x [m]: inverse of [`Grid::x`].
     pub fn column(&self, x: f64) -> f64 {
@@ -73,12 +101,20 @@ impl Grid {
     }
     /// Spatial frequency of transform column `k` [cycles/m]: k/(width·pitch) for the lower half, negative above.
     pub fn frequency_x(&self, k: usize) -> f64 {
-        signed(k, self.width) / (self.width as f64 * self.pitch_x)
+        frequency(signed(k, self.width), self.width, self.pitch_x)
     }
     /// Spatial frequency along +y of transform row `k` [cycles/m]. Rows run downwards, so it is −k/(height·pitch)
     /// for the lower half: exp(+i2π·f_y·y) has its transform there.
     pub fn frequency_y(&self, k: usize) -> f64 {
-        -signed(k, self.height) / (self.height as f64 * self.pitch_y)
+        frequency(-signed(k, self.height), self.height, self.pitch_y)
+    }
+    /// Sine of the angle along x at which the wave of transform column `k` leaves, λ·f_x.
+    pub fn sine_x(&self, k: usize, wavelength: f64) -> f64 {
+        wavelength * signed(k, self.width) as f64 / self.extent_x()
+    }
+    /// Sine of the angle along y at which the wave of transform row `k` leaves, λ·f_y.
+    pub fn sine_y(&self, k: usize, wavelength: f64) -> f64 {
+        -wavelength * signed(k, self.height) as f64 / self.extent_y()
     }
     /// Highest |f_x| that the lattice carries: 1/(2·pitch_x) [cycles/m].
     pub fn limit_x(&self) -> f64 {
@@ -90,9 +126,19 @@ impl Grid {
     }
 }
 
+/// Offset of sample `index` of `count` from their middle [m]; both may be of any integer type.
+pub fn offset(index: f64, count: f64, pitch: f64) -> f64 {
+    (index - (count - 1.0) * 0.5) * pitch
+}
+
+/// Spatial frequency of `cycles` over `count` samples [cycles/m].
+pub fn frequency(cycles: i64, count: usize, pitch: f64) -> f64 {
+    cycles as f64 / (count as f64 * pitch)
+}
+
 /// Index of a discrete transform as a signed number of cycles: −⌊n/2⌋ … ⌈n/2⌉−1.
-fn signed(k: usize, n: usize) -> f64 {
-    if k < n.div_ceil(2) { k as f64 } else { k as f64 - n as f64 }
+fn signed(k: usize, n: usize) -> i64 {
+    if k < n.div_ceil(2) { k as i64 } else { k as i64 - n as i64 }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ mod memory;
 pub mod npy;
 pub mod npy_stack;
 
-pub use fft::{Fft2, fast_length, plans};
+pub use fft::{Fft1, Fft2, FftNum, fast_length};
 pub use grid::Grid;
 pub use memory::zeroed;
 pub use num_complex::{Complex, Complex32, Complex64};

@@ -12,6 +12,7 @@
 //! in the last place of f32: the phase errs by 3e-7·ρ|C| turns, |C| ≈ ab/4.
 
 use super::lanes::{Aligned, Lanes};
+use crate::field::Grid;
 
 /// What all distances share on one grid of frequencies.
 #[derive(Clone, Debug)]
@@ -26,21 +27,16 @@ pub(in crate::hologram) struct Dispersion {
 }
 
 impl Dispersion {
-    /// For transforms of `size` columns and rows over samples of `pitch` [m].
-    pub(in crate::hologram) fn new(size: [usize; 2], pitch: [f64; 2], wavelength: f64) -> Self {
-        let square = |axis: usize, k: usize| {
-            let n = size[axis];
-            let signed = if k < n.div_ceil(2) { k as f64 } else { k as f64 - n as f64 };
-            (wavelength * signed / (n as f64 * pitch[axis])).powi(2)
-        };
-        let [width, height] = size;
-        let (mut squares, mut roots) = (aligned(height), aligned(height));
-        let rows: Vec<f64> = (0..height).map(|k| square(1, k)).collect();
+    /// For transforms on a grid.
+    pub(in crate::hologram) fn new(grid: &Grid, wavelength: f64) -> Self {
+        let (mut squares, mut roots) = (aligned(grid.height), aligned(grid.height));
+        let rows: Vec<f64> = (0..grid.height).map(|k| grid.sine_y(k, wavelength).powi(2)).collect();
         for (k, &b) in rows.iter().enumerate() {
             squares.values_mut()[k] = b as f32;
             roots.values_mut()[k] = (1.0 - b).max(0.0).sqrt() as f32;
         }
-        Self { columns: (0..width).map(|k| square(0, k)).collect(), rows, squares, roots }
+        let columns = (0..grid.width).map(|k| grid.sine_x(k, wavelength).powi(2)).collect();
+        Self { columns, rows, squares, roots }
     }
 
     /// ρ·(√(1 − b) − 1) + `more(row)` modulo one, by row [turns].
@@ -60,7 +56,7 @@ impl Dispersion {
 }
 
 /// Turns less the nearest whole ones.
-fn reduced(turns: f64) -> f32 {
+pub(in crate::hologram) fn reduced(turns: f64) -> f32 {
     (turns - turns.round()) as f32
 }
 

@@ -4,13 +4,13 @@ use super::definition::Optics;
 #[cfg(feature = "gpu")]
 use super::gpu;
 use super::lanes::InstructionSet;
+use super::sources::{PointSum, Source};
 use super::tiles::{self, Class, Products};
-use super::{Cull, Source, near, recurrence};
+use super::{Cull, near, recurrence};
 #[cfg(not(feature = "gpu"))]
 use crate::error::Error;
 use crate::error::Result;
-use crate::field::{Field, Grid};
-use crate::progress::Progress;
+use crate::field::Field;
 use rayon::prelude::*;
 
 /// Error of `direct`, whatever was asked: its tiles are chosen below this.
@@ -48,15 +48,8 @@ pub(crate) struct Division {
 
 impl Division {
     /// Divides points for a wanted error and the products that the engine has; incomplete when asked to stop.
-    pub(crate) fn new(
-        optics: &Optics,
-        grid: &Grid,
-        sources: &[Source],
-        cull: Cull,
-        products: Products,
-        error: f64,
-        progress: &Progress,
-    ) -> Self {
+    pub(crate) fn new(sum: &PointSum, products: Products, error: f64) -> Self {
+        let PointSum { optics, sources, cull, .. } = *sum;
         let is_near = |source: &Source| {
             let inexact = optics.edge_fresnel_number(source.distance) < NEAREST_EDGE
                 || optics.separable_far_error(source.distance) > 0.5 * error;
@@ -64,7 +57,7 @@ impl Division {
         };
         let flags: Vec<bool> = sources.par_iter().map(is_near).collect();
         let (near, rest): (Vec<usize>, Vec<usize>) = (0..sources.len()).partition(|&i| flags[i]);
-        let far = tiles::classify(optics, grid, sources, &rest, cull, products, 0.8 * error, progress);
+        let far = tiles::classify(sum, &rest, products, 0.8 * error);
         // The form's error falls with distance.
         let nearest = rest.iter().map(|&i| sources[i].distance).min_by(f64::total_cmp);
         let form = match (cull, nearest) {
@@ -79,16 +72,9 @@ impl Division {
     }
 
     /// Predicted work on AVX-512 [core-seconds].
-    pub(crate) fn core_seconds(&self, optics: &Optics, grid: &Grid, sources: &[Source], cull: Cull) -> f64 {
-        near::core_seconds(optics, sources, &self.near)
-            + self.far.iter().map(|class| class.core_seconds(optics, grid, sources, cull)).sum::<f64>()
-    }
-
-    /// Work in the unit that [`Progress`] counts: points of near sources, points × tiles of far ones.
-    fn work(&self, grid: &Grid) -> u64 {
-        let tiles =
-            |class: &Class| (grid.width.div_ceil(class.shape.width) * grid.height.div_ceil(class.shape.height)) as u64;
-        self.near.len() as u64 + self.far.iter().map(|class| class.len() as u64 * tiles(class)).sum::<u64>()
+    pub(crate) fn core_seconds(&self, sum: &PointSum) -> f64 {
+        near::core_seconds(sum.optics, sum.sources, &self.near)
+            + self.far.iter().map(|class| class.core_seconds(sum)).sum::<f64>()
     }
 
     /// Block lengths of the classes for the difference method, and the bound on the field's error.
@@ -101,72 +87,57 @@ impl Division {
         (blocks.into_iter().map(|block| block.0).collect(), worst + form)
     }
 
-    /// The sum by the difference method.
-    #[allow(clippy::too_many_arguments)] // the engines' common list
-    pub(crate) fn sum_by_recurrence(
-        &self,
-        grid: &Grid,
-        optics: &Optics,
-        sources: &[Source],
-        cull: Cull,
-        error: f64,
-        set: InstructionSet,
-        progress: &Progress,
-    ) -> Result<Field> {
-        progress.start("hologram: difference method", 0);
-        let mut field = Field::zeros(*grid, optics.wavelength);
-        near::add(&mut field, optics, sources, &self.near, progress)?;
-        for (class, block) in self.far.iter().zip(self.blocks(optics, error).0) {
-            recurrence::add(&mut field, optics, sources, class, block, cull, set, progress)?;
-        }
-        Ok(field)
-    }
-
     /// Bound on the relative L2 error of [`Division::sum_on_gpu`].
     pub(crate) fn gpu_error(&self) -> f64 {
         self.error + GPU_ROUNDING
     }
 
+    /// The near points' field, to which the far ones are added; `far` is the work that they are, in the unit that
+    /// [`Progress`](crate::progress::Progress) counts: points × tiles.
+    fn near_field(&self, sum: &PointSum, what: &str, far: u64) -> Result<Field> {
+        sum.progress.start(what, self.near.len() as u64 + far);
+        let mut field = Field::zeros(*sum.grid, sum.optics.wavelength);
+        near::add(&mut field, sum, &self.near)?;
+        Ok(field)
+    }
+
+    /// The sum.
+    pub(crate) fn sum(&self, sum: &PointSum, set: InstructionSet) -> Result<Field> {
+        let tiles = |class: &Class| {
+            class.len() as u64
+                * (sum.grid.width.div_ceil(class.shape.width) * sum.grid.height.div_ceil(class.shape.height)) as u64
+        };
+        let mut field = self.near_field(sum, "hologram: sum over points", self.far.iter().map(tiles).sum())?;
+        for class in &self.far {
+            tiles::add(&mut field, sum, class, set)?;
+        }
+        Ok(field)
+    }
+
+    /// The sum by the difference method.
+    pub(crate) fn sum_by_recurrence(&self, sum: &PointSum, error: f64, set: InstructionSet) -> Result<Field> {
+        let blocks = self.blocks(sum.optics, error).0;
+        let tiles = |(class, &block): (&Class, &usize)| class.len() as u64 * recurrence::blocks(sum.grid, block) as u64;
+        let work = self.far.iter().zip(&blocks).map(tiles).sum();
+        let mut field = self.near_field(sum, "hologram: difference method", work)?;
+        for (class, block) in self.far.iter().zip(blocks) {
+            recurrence::add(&mut field, sum, class, block, set)?;
+        }
+        Ok(field)
+    }
+
     /// The sum with the far points on the graphics processor.
     #[cfg(feature = "gpu")]
-    pub(crate) fn sum_on_gpu(
-        &self,
-        grid: &Grid,
-        optics: &Optics,
-        sources: &[Source],
-        cull: Cull,
-        progress: &Progress,
-    ) -> Result<Field> {
-        let cells = (grid.width.div_ceil(gpu::CELL) * grid.height.div_ceil(gpu::CELL)) as u64;
+    pub(crate) fn sum_on_gpu(&self, sum: &PointSum) -> Result<Field> {
+        let cells = (sum.grid.width.div_ceil(gpu::CELL) * sum.grid.height.div_ceil(gpu::CELL)) as u64;
         let far: u64 = self.far.iter().map(|class| class.len() as u64).sum();
-        progress.start("hologram: sum over points", self.near.len() as u64 + far * cells);
-        let mut field = Field::zeros(*grid, optics.wavelength);
-        near::add(&mut field, optics, sources, &self.near, progress)?;
-        gpu::add(&mut field, optics, sources, &self.far, cull, progress)?;
+        let mut field = self.near_field(sum, "hologram: sum over points", far * cells)?;
+        gpu::add(&mut field, sum, &self.far)?;
         Ok(field)
     }
     /// The sum with the far points on the graphics processor: not in this build.
     #[cfg(not(feature = "gpu"))]
-    pub(crate) fn sum_on_gpu(&self, _: &Grid, _: &Optics, _: &[Source], _: Cull, _: &Progress) -> Result<Field> {
+    pub(crate) fn sum_on_gpu(&self, _: &PointSum) -> Result<Field> {
         Err(no_gpu())
-    }
-
-    /// The sum.
-    pub(crate) fn sum(
-        &self,
-        grid: &Grid,
-        optics: &Optics,
-        sources: &[Source],
-        cull: Cull,
-        set: InstructionSet,
-        progress: &Progress,
-    ) -> Result<Field> {
-        progress.start("hologram: sum over points", self.work(grid));
-        let mut field = Field::zeros(*grid, optics.wavelength);
-        near::add(&mut field, optics, sources, &self.near, progress)?;
-        for class in &self.far {
-            tiles::add(&mut field, optics, sources, class, cull, set, progress)?;
-        }
-        Ok(field)
     }
 }

@@ -32,7 +32,7 @@ use crate::progress::Progress;
 use definition::Optics;
 use exact::{Division, GPU_ROUNDING};
 use planner::{Engine, ORACLE_ERROR};
-use sources::{Source, sources};
+use sources::{PointSum, sources};
 use std::time::Instant;
 use tiles::Products;
 
@@ -164,38 +164,39 @@ pub fn compute(
     let optics = Optics::new(grid, wavelength)?;
     let cull = plan.settings.cull;
     let sources = sources(points)?;
-    let coverage = Coverage::of(points.len(), &sources, grid, &optics, cull);
+    let sum = PointSum { optics: &optics, grid, sources: &sources, cull, progress };
+    let coverage = Coverage::of(points.len(), &sum);
     progress.check()?;
     let set = plan.instruction_set;
+    let division = |products: Products, error: f64| {
+        let division = Division::new(&sum, products, error);
+        progress.check().map(|()| division)
+    };
+    let cloud = || {
+        let cloud = planes::Cloud::new(&optics, grid, &sources);
+        progress.check().map(|()| cloud)
+    };
     let (field, error_bound) = match plan.engine {
         Engine::Oracle => (oracle::watched(points, grid, wavelength, cull, progress)?.to_f32(), ORACLE_ERROR),
         Engine::Exact { error } => {
-            let division = Division::new(&optics, grid, &sources, cull, Products::of(set), error, progress);
-            progress.check()?;
-            (division.sum(grid, &optics, &sources, cull, set, progress)?, division.error)
+            let division = division(Products::of(set), error)?;
+            (division.sum(&sum, set)?, division.error)
         }
         Engine::Recurrence { error } => {
-            let division = Division::new(&optics, grid, &sources, cull, Products::Float, error, progress);
-            progress.check()?;
-            let bound = division.blocks(&optics, error).1;
-            (division.sum_by_recurrence(grid, &optics, &sources, cull, error, set, progress)?, bound)
+            let division = division(Products::Float, error)?;
+            (division.sum_by_recurrence(&sum, error, set)?, division.blocks(&optics, error).1)
         }
         Engine::Gpu { error } => {
-            let division = Division::new(&optics, grid, &sources, cull, Products::Shader, error, progress);
-            progress.check()?;
-            (division.sum_on_gpu(grid, &optics, &sources, cull, progress)?, division.gpu_error())
+            let division = division(Products::Shader, error)?;
+            (division.sum_on_gpu(&sum)?, division.gpu_error())
         }
         Engine::GpuPlanes(parameters) => {
-            let cloud = planes::Cloud::new(&optics, grid, &sources);
-            progress.check()?;
-            let field = gpu_planes(grid, &optics, &cloud, &parameters, progress)?;
-            (field, parameters.error(&optics, &cloud) + GPU_ROUNDING)
+            let cloud = cloud()?;
+            (gpu_planes(&cloud, &parameters, progress)?, parameters.error(&cloud) + GPU_ROUNDING)
         }
         Engine::Planes(parameters) => {
-            let cloud = planes::Cloud::new(&optics, grid, &sources);
-            progress.check()?;
-            let field = planes::field(grid, &optics, &cloud, &parameters, set, progress)?;
-            (field, parameters.error(&optics, &cloud))
+            let cloud = cloud()?;
+            (planes::field(&cloud, &parameters, set, progress)?, parameters.error(&cloud))
         }
     };
     let report = HologramReport {
@@ -216,7 +217,7 @@ use gpu::planes::field as gpu_planes;
 
 /// A build without the engine.
 #[cfg(not(feature = "gpu"))]
-fn gpu_planes(_: &Grid, _: &Optics, _: &planes::Cloud, _: &planes::Parameters, _: &Progress) -> Result<Field> {
+fn gpu_planes(_: &planes::Cloud, _: &planes::Parameters, _: &Progress) -> Result<Field> {
     Err(exact::no_gpu())
 }
 

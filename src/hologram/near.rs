@@ -14,15 +14,12 @@
 //! position: at node n, X has the spectrum e^{i2πd(f_z − S_n)}·S_n/f_z and Y has e^{i2πdS(f_y)}·L_n(f_y²)/S(f_y), whose
 //! product is the integrand itself.
 
-use super::Source;
 use super::definition::Optics;
+use super::sources::{PointSum, Source};
 use crate::error::Result;
-use crate::field::{Complex32, Complex64, Field, plans};
-use crate::progress::Progress;
+use crate::field::{Complex32, Complex64, Fft1, Field, Grid};
 use rayon::prelude::*;
-use rustfft::Fft;
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 /// Highest number of products: beyond it the direct form is nearer.
 const HIGHEST_RANK: usize = 32;
@@ -83,14 +80,8 @@ pub(crate) fn core_seconds(optics: &Optics, sources: &[Source], indexes: &[usize
 }
 
 /// Adds near sources to the field.
-pub(crate) fn add(
-    field: &mut Field,
-    optics: &Optics,
-    sources: &[Source],
-    indexes: &[usize],
-    progress: &Progress,
-) -> Result<()> {
-    let grid = field.grid;
+pub(crate) fn add(field: &mut Field, sum: &PointSum, indexes: &[usize]) -> Result<()> {
+    let PointSum { optics, grid, sources, progress, .. } = *sum;
     for batch in indexes.chunks(BATCH) {
         let kernels: Vec<Option<Kernel>> = batch
             .par_iter()
@@ -98,8 +89,7 @@ pub(crate) fn add(
                 if progress.stopped() {
                     return None;
                 }
-                let s = &sources[i];
-                Kernel::new(optics, s, grid.column(s.x), grid.row(s.y), grid.width, grid.height, plans)
+                Kernel::new(optics, &sources[i], grid, plans)
             })
             .collect();
         progress.check()?;
@@ -119,10 +109,7 @@ pub(crate) fn add(
 
 /// Transforms of the lengths in use, and their scratch.
 #[derive(Default)]
-struct Plans {
-    plans: Vec<Arc<dyn Fft<f64>>>,
-    scratch: Vec<Complex64>,
-}
+struct Plans(Vec<(Fft1<f64>, Vec<Complex64>)>);
 
 impl Plans {
     /// Σ_k spectrum(k)·exp(+i2πkm/n), in place: the trapezoid rule of the integral over f, whose weight 1/(n·pitch) is
@@ -130,15 +117,14 @@ impl Plans {
     fn sum(&mut self, spectrum: &mut [Complex64]) {
         let n = spectrum.len();
         // Looked up here first: the process' own plans are behind a lock.
-        let plan = match self.plans.iter().find(|plan| plan.len() == n) {
-            Some(plan) => plan.clone(),
-            None => {
-                self.plans.push(plans(n)[1].clone());
-                self.plans[self.plans.len() - 1].clone()
-            }
-        };
-        self.scratch.resize(plan.get_inplace_scratch_len(), Complex64::default());
-        plan.process_with_scratch(spectrum, &mut self.scratch);
+        let at = self.0.iter().position(|(plan, _)| plan.len() == n).unwrap_or_else(|| {
+            let plan = Fft1::new(n);
+            let scratch = plan.scratch();
+            self.0.push((plan, scratch));
+            self.0.len() - 1
+        });
+        let (plan, scratch) = &mut self.0[at];
+        plan.inverse(spectrum, scratch);
     }
 }
 
@@ -150,24 +136,16 @@ struct Kernel {
 }
 
 impl Kernel {
-    /// The patch of a source at fractional column and row; `None` where it misses the panel.
-    fn new(
-        optics: &Optics,
-        source: &Source,
-        column: f64,
-        row: f64,
-        width: usize,
-        height: usize,
-        plans: &mut Plans,
-    ) -> Option<Self> {
+    /// The patch of a source; `None` where it misses the panel.
+    fn new(optics: &Optics, source: &Source, grid: &Grid, plans: &mut Plans) -> Option<Self> {
         let rank = rank(optics, source.distance).unwrap_or(HIGHEST_RANK);
         let span = |axis: usize, position: f64, count: usize| {
             let reach = optics.cone(axis, source.distance) / optics.pitch[axis] + TAIL;
             let first = (position - reach).ceil().max(0.0);
             let last = (position + reach).floor().min(count as f64 - 1.0);
-            (first <= last).then_some((first as usize, last as usize))
+            (first <= last).then_some(Line { axis, position, first: first as usize, last: last as usize })
         };
-        let (columns, rows) = (span(0, column, width)?, span(1, row, height)?);
+        let (columns, rows) = (span(0, grid.column(source.x), grid.width)?, span(1, grid.row(source.y), grid.height)?);
         let inverse = 1.0 / optics.wavelength;
         let highest = optics.taper[1].reach(5.0).powi(2);
         let nodes: Vec<f64> = (0..rank)
@@ -183,7 +161,7 @@ impl Kernel {
                 let z = fz(f * f + node);
                 factor * turns(source.distance * (z - at_node)) * (at_node / z)
             };
-            let mut line = kernel(optics, 0, source.distance, column, columns, plans, spectrum);
+            let mut line = columns.kernel(optics, source.distance, plans, spectrum);
             // A converging wave is the conjugate of a diverging one; the phase φ is not conjugated.
             let phase = turns(source.turns);
             for u in &mut line {
@@ -196,13 +174,13 @@ impl Kernel {
                 let s = fz(f * f);
                 turns(source.distance * s) * (lagrange / s)
             };
-            let mut line = kernel(optics, 1, source.distance, row, rows, plans, spectrum);
+            let mut line = rows.kernel(optics, source.distance, plans, spectrum);
             if source.sign < 0.0 {
                 line.iter_mut().for_each(|u| *u = u.conj());
             }
             y.push(line.iter().map(|u| Complex32::new(u.re as f32, u.im as f32)).collect());
         }
-        Some(Self { first: [columns.0, rows.0], x, y })
+        Some(Self { first: [columns.first, rows.first], x, y })
     }
 
     fn add_row(&self, row: usize, samples: &mut [Complex32]) {
@@ -220,31 +198,41 @@ impl Kernel {
     }
 }
 
-/// ∫ W(f)·spectrum(f)·exp(i2πfΔ) df at the pixels first..=last, Δ from the fractional index `position`.
-fn kernel(
-    optics: &Optics,
+/// The pixels of one axis that a kernel is wanted at.
+struct Line {
     axis: usize,
-    distance: f64,
+    /// Fractional index of the source.
     position: f64,
-    (first, last): (usize, usize),
-    plans: &mut Plans,
-    spectrum: impl Fn(f64) -> Complex64,
-) -> Vec<Complex64> {
-    let (pitch, taper) = (optics.pitch[axis], optics.taper[axis]);
-    let period = 2.0 * (optics.cone(axis, distance) / pitch + SILENCE);
-    let n = (period as usize + 2).next_power_of_two();
-    let step = 1.0 / (n as f64 * pitch);
-    let nearest = position.floor();
-    let offset = position - nearest;
-    let mut values = vec![Complex64::default(); n];
-    // On pixels all frequencies that differ by 1/pitch are one: those beyond the Nyquist limit are added to their alias.
-    let top = (taper.reach(5.0) / step) as isize;
-    for k in -top..=top {
-        let f = k as f64 * step;
-        let turns = -f * pitch * offset;
-        let wave = Complex64::cis((turns - turns.floor()) * TAU);
-        values[k.rem_euclid(n as isize) as usize] += spectrum(f) * wave * (taper.at(f) * step);
+    first: usize,
+    last: usize,
+}
+
+impl Line {
+    /// ∫ W(f)·spectrum(f)·exp(i2πfΔ) df at the pixels, Δ from the source's position.
+    fn kernel(
+        &self,
+        optics: &Optics,
+        distance: f64,
+        plans: &mut Plans,
+        spectrum: impl Fn(f64) -> Complex64,
+    ) -> Vec<Complex64> {
+        let (pitch, taper) = (optics.pitch[self.axis], optics.taper[self.axis]);
+        let period = 2.0 * (optics.cone(self.axis, distance) / pitch + SILENCE);
+        let n = (period as usize + 2).next_power_of_two();
+        let step = 1.0 / (n as f64 * pitch);
+        let nearest = self.position.floor();
+        let offset = self.position - nearest;
+        let mut values = vec![Complex64::default(); n];
+        // On pixels all frequencies that differ by 1/pitch are one: those beyond the Nyquist limit are added to their alias.
+        let top = (taper.reach(5.0) / step) as isize;
+        for k in -top..=top {
+            let f = k as f64 * step;
+            let turns = -f * pitch * offset;
+            let wave = Complex64::cis((turns - turns.floor()) * TAU);
+            values[k.rem_euclid(n as isize) as usize] += spectrum(f) * wave * (taper.at(f) * step);
+        }
+        plans.sum(&mut values);
+        let at = |i: usize| (i as isize - nearest as isize).rem_euclid(n as isize) as usize;
+        (self.first..=self.last).map(|i| values[at(i)]).collect()
     }
-    plans.sum(&mut values);
-    (first..=last).map(|i| values[(i as isize - nearest as isize).rem_euclid(n as isize) as usize]).collect()
 }

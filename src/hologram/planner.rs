@@ -9,7 +9,7 @@ use super::definition::Optics;
 use super::exact::GPU_ROUNDING;
 use super::exact::{DIRECT_ERROR, Division};
 use super::planes::{Cloud, Parameters};
-use super::sources::{Coverage, Source, sources};
+use super::sources::{Coverage, PointSum, Source, sources};
 use super::tiles::{Kernel, Products, Shape};
 use super::{Cull, HologramSettings, InstructionSet, Method, Plan};
 #[cfg(feature = "gpu")]
@@ -72,24 +72,21 @@ struct Candidate {
 
 /// The job, as the candidates see it.
 struct Job<'a> {
-    optics: Optics,
-    grid: &'a Grid,
-    sources: &'a [Source],
+    sum: PointSum<'a>,
     settings: &'a HologramSettings,
     /// What is left of the budget beside the sources [bytes].
     memory: u64,
 }
 
 impl Job<'_> {
-    /// The division for an engine with such products.
-    fn division(&self, products: Products, error: f64) -> Division {
-        let cull = self.settings.cull;
-        Division::new(&self.optics, self.grid, self.sources, cull, products, error, &Progress::new())
+    /// The sources as planes take them.
+    fn cloud(&self) -> Cloud<'_> {
+        Cloud::new(self.sum.optics, self.sum.grid, self.sum.sources)
     }
 
     fn exact(&self, method: Method, error: f64) -> Candidate {
         let set = self.settings.instruction_set.unwrap_or_else(InstructionSet::detect);
-        let division = self.division(Products::of(set), error);
+        let division = Division::new(&self.sum, Products::of(set), error);
         let shape = division.far.iter().max_by_key(|class| class.len()).map(|class| class.shape);
         let words = match shape {
             Some(Shape { kernel: Kernel::Paths, .. }) => "every pixel from its own path".to_owned(),
@@ -103,11 +100,11 @@ impl Job<'_> {
             None => "points near the panel as products of kernels".to_owned(),
         };
         let factor = set_factor(self.settings, method);
-        let core_seconds = division.core_seconds(&self.optics, self.grid, self.sources, self.settings.cull);
+        let core_seconds = division.core_seconds(&self.sum);
         Candidate {
             method,
             engine: Engine::Exact { error },
-            core_seconds: core_seconds * factor + FIELD_PIXEL * self.grid.len() as f64,
+            core_seconds: core_seconds * factor + FIELD_PIXEL * self.sum.grid.len() as f64,
             error: division.error,
             memory: division.bytes,
             words,
@@ -116,10 +113,10 @@ impl Job<'_> {
 
     fn recurrence(&self, error: f64, pairs: f64) -> Candidate {
         let settings = self.settings;
-        let division = self.division(Products::Float, error);
-        let (blocks, bound) = division.blocks(&self.optics, error);
+        let division = Division::new(&self.sum, Products::Float, error);
+        let (blocks, bound) = division.blocks(self.sum.optics, error);
         let (shortest, longest) = blocks.iter().fold((256, 32), |(s, l), &b| (s.min(b), l.max(b)));
-        let near = near::core_seconds(&self.optics, self.sources, &division.near);
+        let near = near::core_seconds(self.sum.optics, self.sum.sources, &division.near);
         let work = recurrence::core_seconds(pairs, shortest) * set_factor(settings, Method::Recurrence);
         Candidate {
             method: Method::Recurrence,
@@ -135,8 +132,8 @@ impl Job<'_> {
     #[cfg(feature = "gpu")]
     fn gpu(&self, error: f64, pairs: f64, threads: f64) -> Result<Candidate> {
         let adapter = gpu::adapter()?;
-        let division = self.division(Products::Shader, error);
-        let near = near::core_seconds(&self.optics, self.sources, &division.near);
+        let division = Division::new(&self.sum, Products::Shader, error);
+        let near = near::core_seconds(self.sum.optics, self.sum.sources, &division.near);
         let far: usize = division.far.iter().map(Class::len).sum();
         let seconds = gpu::seconds(pairs).unwrap_or(pairs / gpu::SOFTWARE_RATE);
         Ok(Candidate {
@@ -144,7 +141,7 @@ impl Job<'_> {
             engine: Engine::Gpu { error },
             core_seconds: near + seconds * threads,
             error: division.gpu_error(),
-            memory: division.bytes + gpu::bytes(self.grid, far),
+            memory: division.bytes + gpu::bytes(self.sum.grid, far),
             words: format!("tiles on {adapter}"),
         })
     }
@@ -161,12 +158,11 @@ impl Job<'_> {
         if self.settings.cull != Cull::Soft {
             return Err(refuse_planes(self.settings));
         }
-        let cloud = Cloud::new(&self.optics, self.grid, self.sources);
+        let cloud = self.cloud();
         // The CPU's model chooses planes and rank; the device's own memory is asked below.
         let error = (self.settings.error - GPU_ROUNDING).max(0.0);
-        let chosen = Parameters::choose(&self.optics, self.grid, &cloud, error, u64::MAX)
-            .ok_or_else(|| refuse_planes(self.settings))?;
-        let cost = gpu::planes::cost(&self.optics, self.grid, &cloud, &chosen.parameters)?;
+        let chosen = Parameters::choose(&cloud, error, u64::MAX).ok_or_else(|| refuse_planes(self.settings))?;
+        let cost = gpu::planes::cost(&cloud, &chosen.parameters)?;
         let Parameters { planes, rank, .. } = chosen.parameters;
         Ok(Candidate {
             method: Method::GpuPlanes,
@@ -187,9 +183,7 @@ impl Job<'_> {
         if self.settings.cull != Cull::Soft {
             return None;
         }
-        let cloud = Cloud::new(&self.optics, self.grid, self.sources);
-        let (error, memory) = (self.settings.error, self.memory);
-        let chosen = Parameters::choose(&self.optics, self.grid, &cloud, error, memory)?;
+        let chosen = Parameters::choose(&self.cloud(), self.settings.error, self.memory)?;
         let Parameters { planes, rank, .. } = chosen.parameters;
         Some(Candidate {
             method: Method::Planes,
@@ -202,12 +196,13 @@ impl Job<'_> {
     }
 
     fn oracle(&self, pairs: f64) -> Candidate {
+        let PointSum { optics, grid, sources, cull, .. } = self.sum;
         Candidate {
             method: Method::Oracle,
             engine: Engine::Oracle,
             core_seconds: pairs * ORACLE_PAIR,
             error: ORACLE_ERROR,
-            memory: oracle::bytes(self.grid, &self.optics, self.settings.cull, self.sources.iter().map(|s| s.distance)),
+            memory: oracle::bytes(grid, optics, cull, sources.iter().map(|s| s.distance)),
             words: "double precision, term by term".to_owned(),
         }
     }
@@ -243,9 +238,11 @@ pub fn plan(points: &[PointSource], grid: &Grid, wavelength: f64, settings: &Hol
         return Err(Error::unsupported(format!("this machine has no {}", set.name())));
     }
     let sources = sources(points)?;
-    let pairs = Coverage::of(points.len(), &sources, grid, &optics, settings.cull).pairs;
+    let (optics, progress) = (&optics, &Progress::new());
+    let sum = PointSum { optics, grid, sources: &sources, cull: settings.cull, progress };
+    let pairs = Coverage::of(points.len(), &sum).pairs;
     let own = (size_of::<Source>() * sources.len()) as u64;
-    let job = Job { optics, grid, sources: &sources, settings, memory: settings.memory.saturating_sub(own) };
+    let job = Job { sum, settings, memory: settings.memory.saturating_sub(own) };
     let threads = rayon::current_num_threads() as f64;
     let (mut best, reason) = match settings.method {
         Some(method) => {

@@ -18,14 +18,12 @@
 //! is normalised, and what stays is about 5e-7·B from q's seed and 6e-8·B^1.5 from rounding. On processors with wide
 //! vectors a sine by polynomial costs no more than two complex products, so [`super::tiles`] is faster at any error.
 
-use super::Cull;
 use super::definition::Optics;
 use super::lanes::{Aligned, InstructionSet, Lanes, cos_sin, dispatch};
-use super::sources::Source;
+use super::sources::{PointSum, Source};
 use super::tiles::{Axis, Class, Limit, taper};
 use crate::error::Result;
-use crate::field::Field;
-use crate::progress::Progress;
+use crate::field::{Field, Grid};
 use rayon::prelude::*;
 
 /// Rows that are carried side by side.
@@ -52,6 +50,11 @@ pub(crate) fn block(optics: &Optics, distance: f64, sine: f64, error: f64) -> (u
     (longest, bound(longest))
 }
 
+/// Blocks of a grid.
+pub(crate) fn blocks(grid: &Grid, block: usize) -> usize {
+    grid.width.div_ceil(block) * grid.height.div_ceil(ROWS)
+}
+
 /// Memory of one wave of blocks [bytes].
 pub(crate) fn bytes(block: usize) -> u64 {
     (WAVE * (2 * ROWS * block + 2 * (block + 16)) * 4) as u64
@@ -63,36 +66,23 @@ pub(crate) fn core_seconds(pairs: f64, block: usize) -> f64 {
 }
 
 /// Adds the sources of a class to the field.
-#[allow(clippy::too_many_arguments)] // the engines' common list
-pub(crate) fn add(
-    field: &mut Field,
-    optics: &Optics,
-    sources: &[Source],
-    class: &Class,
-    block: usize,
-    cull: Cull,
-    set: InstructionSet,
-    progress: &Progress,
-) -> Result<()> {
-    let table = class.edges(optics, cull, progress);
-    let limit = Limit::new(cull, &table);
+pub(crate) fn add(field: &mut Field, sum: &PointSum, class: &Class, block: usize, set: InstructionSet) -> Result<()> {
+    let PointSum { optics, grid, progress, .. } = *sum;
+    let table = class.edges(sum);
+    let limit = Limit::new(sum.cull, &table);
     let axes = [Axis::new(optics, 0, limit), Axis::new(optics, 1, limit)];
     let tangent = class.tangent(optics, limit);
-    let members = class.members(sources);
+    let members = class.members(sum.sources);
     let job = Job { axes: &axes, wavenumber: 1.0 / optics.wavelength, limit, block };
-    let grid = field.grid;
     let across = grid.width.div_ceil(block);
-    let tiles: Vec<usize> = (0..across * grid.height.div_ceil(ROWS)).collect();
+    let tiles: Vec<usize> = (0..blocks(grid, block)).collect();
     let half = [0.5 * block as f64 * grid.pitch_x, 0.5 * ROWS as f64 * grid.pitch_y];
     for wave in tiles.chunks(WAVE) {
         let results: Vec<[Aligned; 2]> = wave
             .par_iter()
             .map(|&tile| {
                 let at = [tile % across * block, tile / across * ROWS];
-                let center = [
-                    grid.x(at[0]) + 0.5 * (block as f64 - 1.0) * grid.pitch_x,
-                    grid.y(at[1]) - 0.5 * (ROWS as f64 - 1.0) * grid.pitch_y,
-                ];
+                let center = grid.middle(at, [block, ROWS]);
                 let mut sums = [Aligned::default(), Aligned::default()];
                 sums.iter_mut().for_each(|sum| sum.reserve(block * ROWS));
                 let mut line = Aligned::default();
@@ -104,11 +94,11 @@ pub(crate) fn add(
                     let (dx, dy) = (center[0] - s.x, center[1] - s.y);
                     let lit = |d: f64, axis: usize| d.abs() - half[axis] <= tangent[axis] * s.distance;
                     if lit(dx, 0) && lit(dy, 1) {
-                        let point = Seen::new(&job, s, dx, dy);
+                        let point = BlockWave::new(&job, s, dx, dy);
                         let (job, sums, line) = (&job, &mut sums, &mut line);
                         // SAFETY: the set was detected; buffers have block·16 and 2·(block + 16) values.
                         unsafe {
-                            dispatch!(set, carry(job: &Job, point: Seen, sums: &mut [Aligned; 2], line: &mut Aligned));
+                            dispatch!(set, carry(job: &Job, point: BlockWave, sums: &mut [Aligned; 2], line: &mut Aligned));
                         }
                     }
                 }
@@ -141,7 +131,7 @@ struct Job<'a> {
 
 /// A point seen from the middle of a block.
 #[derive(Clone, Copy)]
-struct Seen {
+struct BlockWave {
     /// Sines and 1/r.
     sine: [f64; 2],
     inverse: f64,
@@ -156,7 +146,7 @@ struct Seen {
     distance: f64,
 }
 
-impl Seen {
+impl BlockWave {
     fn new(job: &Job, s: &Source, dx: f64, dy: f64) -> Self {
         let r = (dx * dx + dy * dy + s.distance * s.distance).sqrt().max(0.1 / job.wavenumber);
         let turns = s.sign * r * job.wavenumber;
@@ -179,7 +169,7 @@ impl Seen {
 /// # Safety
 /// As [`Lanes`].
 #[inline(always)]
-unsafe fn edge<L: Lanes>(job: &Job, point: &Seen, axis: usize, u: L) -> (L, L) {
+unsafe fn edge<L: Lanes>(job: &Job, point: &BlockWave, axis: usize, u: L) -> (L, L) {
     let a = &job.axes[axis];
     let s = point.sine[axis];
     let step = a.pitch * point.inverse;
@@ -208,7 +198,7 @@ unsafe fn edge<L: Lanes>(job: &Job, point: &Seen, axis: usize, u: L) -> (L, L) {
 }
 
 /// Whether the taper is flat over a whole block.
-fn flat(job: &Job, point: &Seen) -> bool {
+fn flat(job: &Job, point: &BlockWave) -> bool {
     let a = &job.axes[0];
     let reach = (point.sine[0].abs() + 0.5 * job.block as f64 * a.pitch * point.inverse) * a.scale + a.offset;
     match job.limit {
@@ -223,7 +213,7 @@ fn flat(job: &Job, point: &Seen) -> bool {
 /// # Safety
 /// The instruction set of `L` must be enabled; `sums` have block × 16 values, `line` 2·(block + 16).
 #[inline(always)]
-unsafe fn carry<L: Lanes>(job: &Job, point: Seen, sums: &mut [Aligned; 2], line: &mut Aligned) {
+unsafe fn carry<L: Lanes>(job: &Job, point: BlockWave, sums: &mut [Aligned; 2], line: &mut Aligned) {
     let block = job.block;
     let lanes: [f32; 16] = std::array::from_fn(|i| i as f32);
     let half = 0.5 * (block as f64 - 1.0);

@@ -5,7 +5,18 @@ use super::definition::Optics;
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::points::PointSource;
+use crate::progress::Progress;
 use rayon::prelude::*;
+
+/// A sum over points, as all engines of it take it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PointSum<'a> {
+    pub(crate) optics: &'a Optics,
+    pub(crate) grid: &'a Grid,
+    pub(crate) sources: &'a [Source],
+    pub(crate) cull: Cull,
+    pub(crate) progress: &'a Progress,
+}
 
 /// A point that shines.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,11 +132,9 @@ pub struct Coverage {
 
 impl Coverage {
     /// Counts; the light of a cone is taken as even over the frequencies |f| ≤ b, which is its power to (s/b)² ≈ 0.5 %.
-    pub(crate) fn of(points: usize, sources: &[Source], grid: &Grid, optics: &Optics, cull: Cull) -> Self {
-        let edges = [
-            [grid.x(0) - 0.5 * grid.pitch_x, grid.x(grid.width - 1) + 0.5 * grid.pitch_x],
-            [grid.y(grid.height - 1) - 0.5 * grid.pitch_y, grid.y(0) + 0.5 * grid.pitch_y],
-        ];
+    pub(crate) fn of(points: usize, sum: &PointSum) -> Self {
+        let PointSum { optics, grid, sources, cull, .. } = *sum;
+        let edges = grid.edges();
         let slopes = [0, 1].map(|axis| optics.cone(axis, 1.0));
         let one = |source: &Source| {
             let power = source.amplitude * source.amplitude;
@@ -182,7 +191,10 @@ mod tests {
         let grid = Grid::new(100, 100, 8e-6, 8e-6).expect("grid");
         let optics = Optics::new(&grid, 633e-9).expect("optics");
         let of = |points: &[PointSource]| {
-            Coverage::of(points.len(), &sources(points).expect("sources"), &grid, &optics, Cull::Soft)
+            let (sources, progress) = (sources(points).expect("sources"), Progress::new());
+            let sum =
+                PointSum { optics: &optics, grid: &grid, sources: &sources, cull: Cull::Soft, progress: &progress };
+            Coverage::of(points.len(), &sum)
         };
         // At 1 mm the cone (±40 µm) lies inside the panel (±400 µm); 2 mm aside it misses it; on the edge half is lost.
         assert!(of(&[point(0.0, 1e-3, 1.0)]).light_outside < 1e-12);

@@ -342,14 +342,14 @@ fn planes_on_the_gpu_of_every_rank_and_of_crowds_equal_those_of_the_cpu() {
     for (planes, rank) in [(3, 1), (2, 2), (1, 3), (1, 4)] {
         let parameters = planes::Parameters { planes, rank, tail: 28.0, table: planes::Fineness::Fine };
         let set = InstructionSet::detect();
-        let exact = planes::field(&grid, &optics, &cloud, &parameters, set, &progress).expect("cpu");
-        let got = gpu_planes(&grid, &optics, &cloud, &parameters, &progress).expect("gpu");
+        let exact = planes::field(&cloud, &parameters, set, &progress).expect("cpu");
+        let got = gpu_planes(&cloud, &parameters, &progress).expect("gpu");
         let wide: Vec<_> =
             exact.samples.iter().map(|u| crate::field::Complex64::new(u.re.into(), u.im.into())).collect();
         let found = relative_error(&got.samples, &wide);
         println!("{adapter}, {planes} planes, rank {rank}: {found:.2e}");
         assert!(found < 3e-5, "{planes} planes, rank {rank}: {found:.2e}");
-        let again = gpu_planes(&grid, &optics, &cloud, &parameters, &progress).expect("gpu");
+        let again = gpu_planes(&cloud, &parameters, &progress).expect("gpu");
         assert_eq!(got, again, "rank {rank}");
     }
 }

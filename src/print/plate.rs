@@ -4,6 +4,7 @@ use super::reference::{Reference, Side};
 use super::slit::Slit;
 pub use crate::encode::Quantity;
 use crate::error::{Error, Result};
+use crate::field::grid;
 use crate::points::colour::Lasers;
 use crate::units;
 use serde::{Deserialize, Serialize};
@@ -400,11 +401,11 @@ impl Plate {
     }
     /// Position of a column, which may lie outside of the plate [m].
     pub fn x(&self, column: i64) -> f64 {
-        (column as f64 - (self.width as f64 - 1.0) * 0.5) * self.pitch_x
+        grid::offset(column as f64, self.width as f64, self.pitch_x)
     }
     /// Position of a row, which may lie outside of the plate [m]; falls as the row rises.
     pub fn y(&self, row: i64) -> f64 {
-        ((self.height as f64 - 1.0) * 0.5 - row as f64) * self.pitch_y
+        grid::offset((self.height as i64 - 1 - row) as f64, self.height as f64, self.pitch_y)
     }
 }
 

@@ -16,10 +16,9 @@ mod scaled;
 pub use scaled::{ScaledPropagator, propagate_scaled};
 
 use crate::error::{Error, Result};
-use crate::field::{Complex, Fft2, Field, Grid};
+use crate::field::{Complex, Fft2, FftNum, Field, Grid};
 use crate::names::{Name, Named};
 use crate::progress::Progress;
-use rustfft::FftNum;
 use serde::{Deserialize, Serialize};
 
 /// Which wave equation carries the field.

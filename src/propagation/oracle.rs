@@ -1,7 +1,7 @@
 //! The slow obvious propagation: the angular spectrum summed term by term in f64, without a fast transform.
 
 use crate::error::{Error, Result};
-use crate::field::{Complex64, Field, Grid};
+use crate::field::{Complex64, Field, Grid, grid};
 
 /// The band-limited angular spectrum of Matsushima & Shimobaba (2009) by its definition.
 ///
@@ -16,15 +16,13 @@ pub fn propagate(field: &Field<f64>, distance: f64, output: Grid) -> Result<Fiel
         return Err(Error::parameter("output", "the oracle takes windows of one middle and one pitch"));
     }
     let wavelength = field.wavelength;
+    let padded = Grid::new(input.width + output.width, input.height + output.height, input.pitch_x, input.pitch_y)?;
     // The wave of frequency f reaches the offset X = d·λf/√(1 − λ²f²).
     let inside = |axis: usize, f: f64| {
-        let length = [
-            (input.width + output.width) as f64 * input.pitch_x,
-            (input.height + output.height) as f64 * input.pitch_y,
-        ];
+        let length = [padded.extent_x(), padded.extent_y()];
         f64::from(u8::from(f.abs() <= 1.0 / (wavelength * (2.0 * distance / length[axis]).hypot(1.0))))
     };
-    Ok(onto(field, distance, output, [input.width + output.width, input.height + output.height], inside))
+    Ok(onto(field, distance, output, [padded.width, padded.height], inside))
 }
 
 /// The same onto a window of any pitch and middle, with the given numbers of frequencies, spaced by 1/(number × input
@@ -40,8 +38,7 @@ pub fn onto(
     let wavelength = field.wavelength;
     let tau = std::f64::consts::TAU;
     let frequencies = |axis: usize, count: usize, pitch: f64| -> Vec<f64> {
-        let length = count as f64 * pitch;
-        let all = (0..count).map(|k| (k as f64 - (count / 2) as f64) / length);
+        let all = (0..count as i64).map(|k| grid::frequency(k - (count / 2) as i64, count, pitch));
         all.filter(|&f| weight(axis, f) > 0.0).collect()
     };
     let fxs = frequencies(0, width, input.pitch_x);

@@ -20,11 +20,9 @@
 
 use super::{Aperture, Settings, turned, turns_and_decay};
 use crate::error::{Error, Result};
-use crate::field::{Complex, Field, Grid, fast_length, plans};
+use crate::field::{Complex, Fft1, FftNum, Field, Grid, fast_length, grid};
 use crate::progress::Progress;
 use rayon::prelude::*;
-use rustfft::{Fft, FftNum};
-use std::sync::Arc;
 
 /// Columns or rows that one task takes together.
 const STRIP: usize = 16;
@@ -39,7 +37,7 @@ const EDGE: f64 = 3.7;
 const DARK: f64 = 1e-12;
 
 /// A planned propagation between two grids of any pitches, sizes and middles, over one distance.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct ScaledPropagator<T: FftNum> {
     input: Grid,
     output: Grid,
@@ -48,13 +46,7 @@ pub struct ScaledPropagator<T: FftNum> {
     settings: Settings,
     /// Frequencies along x and y.
     counts: [usize; 2],
-    forward: [Arc<dyn Fft<T>>; 2],
-}
-
-impl<T: FftNum> std::fmt::Debug for ScaledPropagator<T> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "ScaledPropagator {:?} → {:?} over {} m", self.input, self.output, self.distance)
-    }
+    lines: [Fft1<T>; 2],
 }
 
 impl<T: FftNum> ScaledPropagator<T> {
@@ -78,8 +70,7 @@ impl<T: FftNum> ScaledPropagator<T> {
                     fast_length(least, 1, &[1])
                 },
             );
-        let forward = counts.map(|n| plans(n)[0].clone());
-        let planned = Self { input, output, wavelength, distance, settings, counts, forward };
+        let planned = Self { input, output, wavelength, distance, settings, counts, lines: counts.map(Fft1::new) };
         let needed = planned.memory();
         if needed > settings.memory {
             return Err(Error::Memory {
@@ -150,10 +141,10 @@ impl<T: FftNum> ScaledPropagator<T> {
         // Rows to frequencies, those in the band.
         let mut rows = vec![zero; height * x.range.count];
         rows.par_chunks_mut(x.range.count).zip(field.samples.par_chunks(self.input.width)).for_each_init(
-            || (vec![zero; x.n], vec![zero; self.forward[0].get_inplace_scratch_len()]),
+            || (vec![zero; x.n], self.lines[0].scratch()),
             |(line, scratch), (out, row)| {
                 if !progress.stopped() {
-                    spectrum(&self.forward[0], row.iter().copied(), line, scratch);
+                    spectrum(&self.lines[0], row.iter().copied(), line, scratch);
                     x.range.copy(line, out);
                 }
             },
@@ -162,7 +153,7 @@ impl<T: FftNum> ScaledPropagator<T> {
         // Columns to frequencies, carried, and back onto the output's rows.
         let mut columns = vec![zero; x.range.count * out_height];
         columns.par_chunks_mut(out_height * STRIP).enumerate().for_each_init(
-            || (y.chirp.buffer(), vec![zero; y.n], vec![zero; self.forward[1].get_inplace_scratch_len()]),
+            || (y.chirp.buffer(), vec![zero; y.n], self.lines[1].scratch()),
             |(buffer, line, scratch), (strip, out)| {
                 if progress.stopped() {
                     return;
@@ -170,7 +161,7 @@ impl<T: FftNum> ScaledPropagator<T> {
                 let mut lit = vec![zero; y.range.count];
                 for (i, out) in out.chunks_exact_mut(out_height).enumerate() {
                     let column = strip * STRIP + i;
-                    spectrum(&self.forward[1], rows.iter().skip(column).step_by(x.range.count).copied(), line, scratch);
+                    spectrum(&self.lines[1], rows.iter().skip(column).step_by(x.range.count).copied(), line, scratch);
                     y.range.copy(line, &mut lit);
                     let fx = x.frequency(column);
                     for (k, u) in lit.iter_mut().enumerate() {
@@ -213,31 +204,30 @@ impl<T: FftNum> ScaledPropagator<T> {
         } else {
             ([input.pitch_y, output.pitch_y], output.height, input.y(0) - output.y(0))
         };
-        let length = n as f64 * pitches[0];
         let half = (n / 2) as i64;
         // The highest frequency of an even number, whose sign is undecided, is left out.
         let (low, high) = (if n % 2 == 0 { 1 - half } else { -half }, n as i64 - half - 1);
-        let sign = if axis == 0 { 1.0 } else { -1.0 };
-        let weight = |k: i64| self.weight(axis, sign * k as f64 / length);
+        let sign = if axis == 0 { 1 } else { -1 };
+        let weight = |k: i64| self.weight(axis, grid::frequency(sign * k, n, pitches[0]));
         let first = (low..=high).find(|&k| weight(k) > DARK).unwrap_or(low);
         let last = (first..=high).rev().find(|&k| weight(k) > DARK);
         let range = Range { first, count: last.map_or(0, |last| (last - first + 1) as usize) };
         let weights = (0..range.count).map(|k| weight(first + k as i64)).collect();
-        let chirp = Chirp::new(&range, m, pitches[1] / length, 1.0 / n as f64);
-        Axis { n, length, range, weights, shift, chirp }
+        let chirp = Chirp::new(&range, m, pitches[1] / (n as f64 * pitches[0]), 1.0 / n as f64);
+        Axis { n, pitch: pitches[0], range, weights, shift, chirp }
     }
 }
 
 /// The transform of samples followed by zeros.
 fn spectrum<T: FftNum>(
-    plan: &Arc<dyn Fft<T>>,
+    plan: &Fft1<T>,
     samples: impl Iterator<Item = Complex<T>>,
     line: &mut [Complex<T>],
     scratch: &mut [Complex<T>],
 ) {
     line.fill(Complex::new(T::zero(), T::zero()));
     line.iter_mut().zip(samples).for_each(|(u, sample)| *u = sample);
-    plan.process_with_scratch(line, scratch);
+    plan.forward(line, scratch);
 }
 
 /// Signed indexes of the frequencies in the band.
@@ -259,8 +249,8 @@ impl Range {
 /// One axis of one propagation.
 struct Axis<T: FftNum> {
     n: usize,
-    /// Period [m].
-    length: f64,
+    /// Distance of the samples [m]; the period is n times that.
+    pitch: f64,
     range: Range,
     /// Of each frequency in the range.
     weights: Vec<f64>,
@@ -272,7 +262,7 @@ struct Axis<T: FftNum> {
 impl<T: FftNum> Axis<T> {
     /// Frequency of index `k` of the band [cycles/m].
     fn frequency(&self, k: usize) -> f64 {
-        (self.range.first + k as i64) as f64 / self.length
+        grid::frequency(self.range.first + k as i64, self.n, self.pitch)
     }
 }
 
@@ -285,14 +275,14 @@ struct Chirp<T: FftNum> {
     after: Vec<Complex<T>>,
     /// Transform of exp(−iπα d²), over the length.
     kernel: Vec<Complex<T>>,
-    plans: [Arc<dyn Fft<T>>; 2],
+    plan: Fft1<T>,
 }
 
 impl<T: FftNum> Chirp<T> {
     fn new(range: &Range, m: usize, alpha: f64, scale: f64) -> Self {
         let least = range.count + m;
         let length = fast_length(least, 1, &[1]);
-        let plans = plans(length);
+        let plan = Fft1::new(length);
         // d² reaches 1e9 and α is below one: the product is exact to 1e-7 turns in f64 before it is reduced.
         let wave = |index: i64, sign: f64, scale: f64| {
             let square = (index as f64) * (index as f64);
@@ -306,15 +296,13 @@ impl<T: FftNum> Chirp<T> {
             let at = offset.rem_euclid(length as i64) as usize;
             kernel[at] = wave(offset - range.first, -1.0, 1.0 / length as f64);
         }
-        plans[0].process(&mut kernel);
-        Self { length, before, after, kernel, plans }
+        plan.forward(&mut kernel, &mut plan.scratch());
+        Self { length, before, after, kernel, plan }
     }
 
     /// Memory for [`Chirp::run`]: the convolution and its transforms' scratch.
     fn buffer(&self) -> [Vec<Complex<T>>; 2] {
-        let zero = Complex::new(T::zero(), T::zero());
-        let scratch = self.plans.iter().map(|plan| plan.get_inplace_scratch_len()).max().unwrap_or(0);
-        [vec![zero; self.length], vec![zero; scratch]]
+        [vec![Complex::new(T::zero(), T::zero()); self.length], self.plan.scratch()]
     }
 
     fn run(&self, values: &[Complex<T>], [line, scratch]: &mut [Vec<Complex<T>>; 2], out: &mut [Complex<T>]) {
@@ -322,9 +310,9 @@ impl<T: FftNum> Chirp<T> {
         for ((u, &value), &chirp) in line.iter_mut().zip(values).zip(&self.before) {
             *u = value * chirp;
         }
-        self.plans[0].process_with_scratch(line, scratch);
+        self.plan.forward(line, scratch);
         line.iter_mut().zip(&self.kernel).for_each(|(u, &k)| *u = *u * k);
-        self.plans[1].process_with_scratch(line, scratch);
+        self.plan.inverse(line, scratch);
         for ((out, &u), &chirp) in out.iter_mut().zip(line.iter()).zip(&self.after) {
             *out = u * chirp;
         }

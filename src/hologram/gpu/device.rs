@@ -1,6 +1,5 @@
 //! The graphics processor: found once, kept for the life of the process.
 
-use super::record::pipelines;
 use crate::error::{Error, Result};
 use pixels::wgpu;
 use std::pin::pin;
@@ -88,6 +87,25 @@ impl Device {
     pub(super) fn failed(&self, what: impl std::fmt::Display) -> Error {
         Error::unsupported(format!("the graphics processor {} failed: {what}; take tiles or planes", self.name))
     }
+}
+
+/// Pipelines of a module's entry points.
+pub(super) fn pipelines<const N: usize>(
+    device: &wgpu::Device,
+    source: wgpu::ShaderModuleDescriptor,
+    entries: [&str; N],
+) -> [wgpu::ComputePipeline; N] {
+    let module = device.create_shader_module(source);
+    entries.map(|entry| {
+        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(entry),
+            layout: None,
+            module: &module,
+            entry_point: Some(entry),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        })
+    })
 }
 
 /// The value of a future that is ready at once, as those of native wgpu are.

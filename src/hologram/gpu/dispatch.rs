@@ -1,13 +1,12 @@
 //! Dispatches of the GPU engine: prepared cells in, a band of the field out.
 
 use super::device::Device;
+use super::record::{Readback, group, storage, uniform};
 use super::{Band, CELL, Job, Point, Set, WAVE};
 use crate::error::Result;
-use crate::field::{Complex32, Field};
 use crate::progress::Progress;
 use pixels::wgpu;
 use rayon::prelude::*;
-use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 /// Points of one dispatch.
@@ -35,22 +34,12 @@ pub(super) struct Engine<'a> {
 
 impl<'a> Engine<'a> {
     pub(super) fn new(device: &'a Device, pixels: usize) -> Self {
-        let buffer = |label: &str, size: usize, usage: wgpu::BufferUsages| {
-            let descriptor = wgpu::BufferDescriptor {
-                label: Some(label),
-                size: size as u64,
-                usage: usage | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            };
-            device.device.create_buffer(&descriptor)
-        };
-        let storage = wgpu::BufferUsages::STORAGE;
         Self {
             device,
-            job: buffer("job", size_of::<Job>(), wgpu::BufferUsages::UNIFORM),
-            points: buffer("points", CHUNK * size_of::<Point>(), storage),
-            cells: buffer("cells", CELLS * 16, storage),
-            band: buffer("band", 8 * pixels, storage | wgpu::BufferUsages::COPY_SRC),
+            job: uniform(device, "job", &[0; size_of::<Job>()]),
+            points: storage(device, "points", (CHUNK * size_of::<Point>()) as u64),
+            cells: storage(device, "cells", CELLS as u64 * 16),
+            band: storage(device, "band", 8 * pixels as u64),
             pairs: 4e6,
         }
     }
@@ -61,15 +50,7 @@ impl<'a> Engine<'a> {
         self.device.queue.write_buffer(&self.job, 0, bytemuck::bytes_of(&job));
         let pipeline = &self.device.pipelines[set.pipeline];
         let bound = [&self.job, &self.points, &self.cells, &set.edges, &self.band];
-        let entries: Vec<wgpu::BindGroupEntry> = (0..)
-            .zip(bound)
-            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-            .collect();
-        let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        });
+        let group = group(self.device, pipeline, &bound);
         let size = size_of::<Point>() * set.members.len().max(1);
         let together = (WAVE as usize / size).max(1);
         let cells = band.cells();
@@ -156,49 +137,6 @@ impl<'a> Engine<'a> {
 
     /// Begins to fetch the band, and leaves it dark for the next.
     pub(super) fn read_back(&self, band: &Band) -> Readback {
-        let size = 8 * (band.grid.width * band.rows) as u64;
-        let staging = self.device.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("staging"),
-            size,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&self.band, 0, &staging, 0, size);
-        encoder.clear_buffer(&self.band, 0, None);
-        self.device.queue.submit([encoder.finish()]);
-        let (sender, mapped) = channel();
-        staging.map_async(wgpu::MapMode::Read, .., move |result| {
-            // The receiver is gone where the computation was given up.
-            let _ = sender.send(result.map_err(|e| e.to_string()));
-        });
-        Readback { first: band.first, staging, mapped }
-    }
-}
-
-/// A band on its way to the host.
-pub(super) struct Readback {
-    first: usize,
-    staging: wgpu::Buffer,
-    mapped: Receiver<std::result::Result<(), String>>,
-}
-
-impl Readback {
-    pub(super) fn add_to(self, device: &Device, field: &mut Field) -> Result<()> {
-        let mapped = loop {
-            match self.mapped.try_recv() {
-                Ok(mapped) => break mapped,
-                Err(_) => device.wait(None)?,
-            }
-        };
-        mapped.map_err(|what| device.failed(what))?;
-        let bytes = self.staging.slice(..).get_mapped_range();
-        let samples: &[Complex32] = bytemuck::cast_slice(&bytes);
-        let from = self.first * field.grid.width;
-        let to = &mut field.samples[from..from + samples.len()];
-        to.par_chunks_mut(1 << 16).zip(samples.par_chunks(1 << 16)).for_each(|(to, from)| {
-            to.iter_mut().zip(from).for_each(|(u, add)| *u += add);
-        });
-        Ok(())
+        Readback::new(self.device, &self.band, band.grid.width * band.rows, true)
     }
 }

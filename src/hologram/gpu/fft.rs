@@ -3,8 +3,8 @@
 //! Each pass reads one buffer and writes the other, so no bit reversal is needed, and any 2^a·3^b·5^c is a length. Roots
 //! of unity come from f64.
 
-use super::device::Device;
-use super::record::{Recorder, group, pipelines, uniform, upload};
+use super::device::{Device, pipelines};
+use super::record::{Recorder, group, uniform, upload};
 use crate::error::Result;
 use crate::field::{Complex32, Complex64};
 use pixels::wgpu;
@@ -145,7 +145,7 @@ fn pipelines_of(device: &Device) -> &'static [wgpu::ComputePipeline; 4] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::record::{fetch, storage};
+    use super::super::record::{Readback, storage};
     use super::*;
     use crate::field::{Fft2, relative_error};
     use crate::progress::Progress;
@@ -190,7 +190,9 @@ mod tests {
                 transform.run(&mut recorder).expect("passes");
                 recorder.submit().expect("passes");
                 let mut found = vec![Complex32::default(); given.len()];
-                fetch(device, &buffers[transform.result], &mut found).expect("read back");
+                Readback::new(device, &buffers[transform.result], found.len(), false)
+                    .add_to(device, &mut found)
+                    .expect("read back");
                 let error = relative_error(&found, &wanted);
                 println!("{width}×{height} {direction:?}: {error:.2e}");
                 assert!(error < 1e-6, "{width}×{height} {direction:?}: {error:.2e}");

@@ -23,14 +23,15 @@ mod strokes;
 
 use super::Cull;
 use super::definition::Optics;
-use super::sources::Source;
+use super::sources::{PointSum, Source};
 use super::tiles::{Axis, Class, EdgeTable, Kernel, Limit, Products};
 use crate::error::Result;
 use crate::field::{Field, Grid};
 use crate::progress::Progress;
 use device::Device;
-use dispatch::{CHUNK, Engine, Readback};
+use dispatch::{CHUNK, Engine};
 use pixels::wgpu;
+use record::{Readback, upload};
 use std::sync::OnceLock;
 use std::time::Instant;
 
@@ -107,14 +108,15 @@ fn measured_rate(device: &Device) -> Result<f64> {
     let source = Source { x: 0.0, y: 0.0, distance: 0.3, sign: 1.0, amplitude: 1.0, turns: 0.0 };
     let sources = vec![source; 1024];
     let indexes: Vec<usize> = (0..sources.len()).collect();
-    let (products, progress) = (Products::Shader, Progress::new());
-    let classes = super::tiles::classify(&optics, &grid, &sources, &indexes, Cull::None, products, 1e-2, &progress);
+    let progress = &Progress::new();
+    let sum = PointSum { optics: &optics, grid: &grid, sources: &sources, cull: Cull::None, progress };
+    let classes = super::tiles::classify(&sum, &indexes, Products::Shader, 1e-2);
     let mut field = Field::zeros(grid, optics.wavelength);
     let mut seconds = f64::INFINITY;
     // The first run compiles and raises clocks.
     for _ in 0..2 {
         let start = Instant::now();
-        add_with(device, &mut field, &optics, &sources, &classes, Cull::None, &Progress::new())?;
+        add_with(device, &mut field, &sum, &classes)?;
         seconds = seconds.min(start.elapsed().as_secs_f64());
     }
     Ok(grid.len() as f64 * sources.len() as f64 / seconds)
@@ -124,46 +126,34 @@ fn measured_rate(device: &Device) -> Result<f64> {
 ///
 /// # Errors
 /// [`Error::Unsupported`](crate::Error::Unsupported) without an adapter, or with the driver's words when it fails.
-pub(crate) fn add(
-    field: &mut Field,
-    optics: &Optics,
-    sources: &[Source],
-    classes: &[Class],
-    cull: Cull,
-    progress: &Progress,
-) -> Result<()> {
-    add_with(device::device()?, field, optics, sources, classes, cull, progress)
+pub(crate) fn add(field: &mut Field, sum: &PointSum, classes: &[Class]) -> Result<()> {
+    add_with(device::device()?, field, sum, classes)
 }
 
-fn add_with(
-    device: &Device,
-    field: &mut Field,
-    optics: &Optics,
-    sources: &[Source],
-    classes: &[Class],
-    cull: Cull,
-    progress: &Progress,
-) -> Result<()> {
-    let grid = field.grid;
+fn add_with(device: &Device, field: &mut Field, sum: &PointSum, classes: &[Class]) -> Result<()> {
+    let PointSum { optics, grid, progress, .. } = *sum;
     let limits = device.device.limits();
     let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(BAND);
     let rows = ((binding / (8 * grid.width as u64)) as usize).clamp(1, grid.height);
-    let sets: Vec<Set> = classes.iter().map(|class| Set::new(device, optics, sources, class, cull, progress)).collect();
+    let sets: Vec<Set> = classes.iter().map(|class| Set::new(device, sum, class)).collect();
     progress.check()?;
     let mut engine = Engine::new(device, grid.width * rows);
-    let mut behind: Option<Readback> = None;
+    let mut behind: Option<(usize, Readback)> = None;
+    let mut add = |(first, read): (usize, Readback)| {
+        let rest = &mut field.samples[first * grid.width..];
+        read.add_to(device, rest)
+    };
     for first in (0..grid.height).step_by(rows) {
-        let band =
-            Band { grid: &grid, first, rows: rows.min(grid.height - first), wavenumber: 1.0 / optics.wavelength };
+        let band = Band { grid, first, rows: rows.min(grid.height - first), wavenumber: 1.0 / optics.wavelength };
         for set in &sets {
             engine.sum(&band, set, progress)?;
         }
         let now = engine.read_back(&band);
-        if let Some(previous) = behind.replace(now) {
-            previous.add_to(device, field)?;
+        if let Some(previous) = behind.replace((first, now)) {
+            add(previous)?;
         }
     }
-    behind.map_or(Ok(()), |last| last.add_to(device, field))
+    behind.map_or(Ok(()), add)
 }
 
 /// Rows of the field that are computed together.
@@ -183,10 +173,8 @@ impl Band<'_> {
 
     /// The members that light a cell.
     fn points(&self, set: &Set, [column, row]: [usize; 2]) -> Vec<Point> {
-        let middle = 0.5 * (CELL as f64 - 1.0);
-        let x = self.grid.x(column) + middle * self.grid.pitch_x;
-        let y = self.grid.y(self.first + row) - middle * self.grid.pitch_y;
-        let half = [self.grid.pitch_x, self.grid.pitch_y].map(|pitch| 0.5 * CELL as f64 * pitch);
+        let [x, y] = self.grid.middle([column, self.first + row], [CELL; 2]);
+        let half = self.grid.pitch().map(|pitch| 0.5 * CELL as f64 * pitch);
         let mut points = Vec::new();
         for s in &set.members {
             let (dx, dy) = (x - s.x, y - s.y);
@@ -225,15 +213,9 @@ struct Set {
 }
 
 impl Set {
-    fn new(
-        device: &Device,
-        optics: &Optics,
-        sources: &[Source],
-        class: &Class,
-        cull: Cull,
-        progress: &Progress,
-    ) -> Self {
-        let table = class.edges(optics, cull, progress);
+    fn new(device: &Device, sum: &PointSum, class: &Class) -> Self {
+        let (optics, cull) = (sum.optics, sum.cull);
+        let table = class.edges(sum);
         let limit = Limit::new(cull, &table);
         let axes = [0, 1].map(|axis| Axis::new(optics, axis, limit));
         let job = Job {
@@ -257,15 +239,9 @@ impl Set {
         };
         // A binding must not be empty.
         let values: &[f32] = if table.values.is_empty() { &[0.0; 4] } else { &table.values };
-        let edges = device.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("edges"),
-            size: size_of_val(values) as u64,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        device.queue.write_buffer(&edges, 0, bytemuck::cast_slice(values));
+        let edges = upload(device, "edges", bytemuck::cast_slice(values));
         Self {
-            members: class.members(sources),
+            members: class.members(sum.sources),
             tangent: class.tangent(optics, limit),
             pipeline: usize::from(class.shape.kernel == Kernel::Paths),
             edges,

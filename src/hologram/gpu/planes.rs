@@ -10,13 +10,14 @@
 //! All moments of a plane, a spare, and the spectrum stay on the device, and each is one binding: a job whose planes
 //! pass the adapter's largest is refused ([`cost`]).
 
-use super::device::{Device, device};
+use super::device::{Device, device, pipelines};
 use super::fft::{Direction, Roots, Transform};
-use super::record::{Recorder, fetch, group, pipelines, storage, uniform, upload};
+use super::record::{Readback, Recorder, group, storage, uniform, upload};
 use super::strokes::{ENTRIES, Lists, STROKES, Stroke, chunks, span, tiles};
 use crate::error::{Error, Result};
 use crate::field::{Field, Grid};
 use crate::hologram::definition::Optics;
+use crate::hologram::dispersion::{Dispersion, reduced};
 use crate::hologram::planes::{Cloud, Dab, Layout, Parameters, Slabs, Table, carrier, dab, layout_of, mean_square};
 use crate::hologram::sources::Source;
 use crate::progress::Progress;
@@ -44,9 +45,9 @@ pub(crate) struct Cost {
 }
 
 /// The planes, and the grid of transforms whose lengths have the factors 2, 3 and 5 only.
-fn arrangement(optics: &Optics, grid: &Grid, cloud: &Cloud, parameters: &Parameters) -> (Slabs, Layout) {
-    let slabs = parameters.slabs(optics, cloud);
-    let layout = layout_of(optics, grid, cloud, parameters, &slabs, &[1]);
+fn arrangement(cloud: &Cloud, parameters: &Parameters) -> (Slabs, Layout) {
+    let slabs = parameters.slabs(cloud);
+    let layout = layout_of(cloud, parameters, &slabs, &[1]);
     (slabs, layout)
 }
 
@@ -56,17 +57,16 @@ fn arrangement(optics: &Optics, grid: &Grid, cloud: &Cloud, parameters: &Paramet
 ///
 /// # Errors
 /// [`Error::Unsupported`] without an adapter, or where a plane or a table passes its largest binding.
-pub(crate) fn cost(optics: &Optics, grid: &Grid, cloud: &Cloud, parameters: &Parameters) -> Result<Cost> {
+pub(crate) fn cost(cloud: &Cloud, parameters: &Parameters) -> Result<Cost> {
     let device = device()?;
+    let (optics, grid) = (cloud.optics, cloud.grid);
     if cloud.sources.is_empty() {
         return Ok(Cost { seconds: 0.0, bytes: 0 });
     }
-    let (slabs, layout) = arrangement(optics, grid, cloud, parameters);
+    let (slabs, layout) = arrangement(cloud, parameters);
     let [width, height] = layout.size;
     let samples = (width * height) as u64;
-    let (tail, table) = (parameters.tail, parameters.table);
-    let axes = if optics.pitch[0] == optics.pitch[1] { 0..1 } else { 0..2 };
-    let tables: Vec<u64> = axes.map(|axis| Table::bytes(optics, axis, slabs.half, tail, table) + 64).collect();
+    let tables: Vec<u64> = parameters.table_bytes(optics, slabs.half).iter().map(|bytes| bytes + 64).collect();
     let largest = tables.iter().copied().fold(8 * samples, u64::max).max(4 * ENTRIES as u64);
     let limits = device.device.limits();
     let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
@@ -84,8 +84,10 @@ pub(crate) fn cost(optics: &Optics, grid: &Grid, cloud: &Cloud, parameters: &Par
     let host = count * own + 2 * (chunk * size_of::<Stroke>() + 4 * ENTRIES) + 8 * grid.len();
     let on_device = (parameters.rank as u64 + 2) * 8 * samples + (STROKES * size_of::<Stroke>() + 4 * ENTRIES) as u64;
     let bytes = on_device + host as u64 + 2 * tables.iter().sum::<u64>();
-    let area: f64 =
-        [0, 1].map(|axis| 2.0 * Table::half_width(optics, axis, slabs.half, tail) as f64 + 64.0).iter().product();
+    let area: f64 = [0, 1]
+        .map(|axis| 2.0 * Table::half_width(optics, axis, slabs.half, parameters.tail) as f64 + 64.0)
+        .iter()
+        .product();
     let pairs = (parameters.rank * count) as f64 * area;
     let passes = (slabs.depths.len() * parameters.rank + 1) as f64 * 12.0;
     // A tenth of a nanosecond for a sample of a pass on hardware, tens on the CPU; tables are built on the CPU.
@@ -146,21 +148,6 @@ struct Window {
     unused: u32,
 }
 
-/// λ²f² by index of a transform.
-fn squares(optics: &Optics, layout: &Layout, axis: usize) -> Vec<f64> {
-    let n = layout.size[axis];
-    let square = |k: usize| {
-        let signed = if k < n.div_ceil(2) { k as f64 } else { k as f64 - n as f64 };
-        (optics.wavelength * signed / (n as f64 * optics.pitch[axis])).powi(2)
-    };
-    (0..n).map(square).collect()
-}
-
-/// The part of the turns beyond whole ones.
-fn reduced(turns: f64) -> f32 {
-    (turns - turns.round()) as f32
-}
-
 /// Buffers and bindings of one moment.
 struct Moment {
     plane: wgpu::Buffer,
@@ -175,13 +162,13 @@ struct Moment {
 struct Engine<'a> {
     optics: &'a Optics,
     layout: Layout,
+    /// a and b, λ²f², by column and row of the transforms.
+    dispersion: Dispersion,
     paint: Paint,
     carry: Carry,
     strokes: wgpu::Buffer,
     entries: wgpu::Buffer,
     tiles: wgpu::Buffer,
-    /// a and b, λ²f², by column and row of the transforms.
-    squares: [Vec<f64>; 2],
     columns: wgpu::Buffer,
     rows: wgpu::Buffer,
     roots: Roots,
@@ -191,16 +178,10 @@ struct Engine<'a> {
 }
 
 impl<'a> Engine<'a> {
-    fn new(
-        device: &Device,
-        optics: &'a Optics,
-        layout: Layout,
-        tables: [&Table; 2],
-        half: f64,
-        rank: usize,
-        strokes: usize,
-    ) -> Self {
+    /// `half` is the slabs' half depth [m].
+    fn new(device: &Device, cloud: &'a Cloud, layout: Layout, tables: [&Table; 2], half: f64, rank: usize) -> Self {
         let [width, height] = layout.size;
+        let optics = cloud.optics;
         let lambda = optics.wavelength;
         let lines = tables.map(Table::lines);
         let paint = Paint {
@@ -230,10 +211,8 @@ impl<'a> Engine<'a> {
         let is_one = std::ptr::eq(tables[0], tables[1]);
         let second = (!is_one).then(|| upload(device, "table", bytemuck::cast_slice(lines[1].0)));
         let [across, down] = tiles(&layout);
-        let (strokes, entries) = (
-            storage(device, "strokes", (strokes.min(STROKES) * size_of::<Stroke>()) as u64),
-            storage(device, "lists", 4 * ENTRIES as u64),
-        );
+        let strokes = storage(device, "strokes", (cloud.sources.len().min(STROKES) * size_of::<Stroke>()) as u64);
+        let entries = storage(device, "lists", 4 * ENTRIES as u64);
         let tiles = storage(device, "tiles", (across * down * size_of::<[u32; 4]>()) as u64);
         let (columns, rows) =
             (storage(device, "columns", 16 * width as u64), storage(device, "rows", 16 * height as u64));
@@ -255,16 +234,16 @@ impl<'a> Engine<'a> {
                 Moment { plane: own, paint, painting, transform, carry, carrying }
             })
             .collect();
-        let squares = [0, 1].map(|axis| squares(optics, &layout, axis));
+        let dispersion = Dispersion::new(&layout.grid(optics), lambda);
         Self {
             optics,
             layout,
+            dispersion,
             paint,
             carry,
             strokes,
             entries,
             tiles,
-            squares,
             columns,
             rows,
             roots,
@@ -308,8 +287,8 @@ impl<'a> Engine<'a> {
             let root = (1.0 - b).max(0.0).sqrt();
             [b as f32, root as f32, reduced(-ratio * b.min(1.0) / (1.0 + root)), 0.0]
         };
-        let columns: Vec<[f32; 4]> = self.squares[0].iter().map(column).collect();
-        let rows: Vec<[f32; 4]> = self.squares[1].iter().map(row).collect();
+        let columns: Vec<[f32; 4]> = self.dispersion.columns.iter().map(column).collect();
+        let rows: Vec<[f32; 4]> = self.dispersion.rows.iter().map(row).collect();
         let queue = &recorder.device.queue;
         queue.write_buffer(&self.columns, 0, bytemuck::cast_slice(&columns));
         queue.write_buffer(&self.rows, 0, bytemuck::cast_slice(&rows));
@@ -349,7 +328,7 @@ impl<'a> Engine<'a> {
         recorder.dispatch(pipeline, &bound, [grid.width.div_ceil(THREADS) as u32, grid.height as u32])?;
         recorder.submit()?;
         let mut field = Field::zeros(*grid, self.optics.wavelength);
-        fetch(device, &self.sum, &mut field.samples)?;
+        Readback::new(device, &self.sum, grid.len(), false).add_to(device, &mut field.samples)?;
         Ok(field)
     }
 }
@@ -358,40 +337,32 @@ impl<'a> Engine<'a> {
 ///
 /// # Errors
 /// Those of [`cost`]; [`Error::Unsupported`] with the driver's words when it fails; [`Error::Interrupted`].
-pub(crate) fn field(
-    grid: &Grid,
-    optics: &Optics,
-    cloud: &Cloud,
-    parameters: &Parameters,
-    progress: &Progress,
-) -> Result<Field> {
+pub(crate) fn field(cloud: &Cloud, parameters: &Parameters, progress: &Progress) -> Result<Field> {
     let device = device()?;
-    let sources = &cloud.sources;
+    let Cloud { optics, grid, sources, .. } = cloud;
     if sources.is_empty() {
-        return Ok(Field::zeros(*grid, optics.wavelength));
+        return Ok(Field::zeros(**grid, optics.wavelength));
     }
     // A plan may come from another cloud, whose planes were smaller.
-    cost(optics, grid, cloud, parameters)?;
-    let (slabs, layout) = arrangement(optics, grid, cloud, parameters);
+    cost(cloud, parameters)?;
+    let (slabs, layout) = arrangement(cloud, parameters);
     let h = slabs.half;
     let plane_work = layout.size[0] as u64;
     progress.start("hologram: planes", sources.len() as u64 + plane_work * slabs.depths.len() as u64);
-    let table = |axis| Table::new(optics, axis, h, parameters.tail, parameters.table, progress);
-    let first = table(0);
-    let second = (optics.pitch[0] != optics.pitch[1]).then(|| table(1));
-    let tables: [&Table; 2] = [&first, second.as_deref().unwrap_or(&first)];
+    let tables = parameters.tables(optics, h, progress);
+    let tables = tables.each_ref().map(|table| &**table);
     progress.check()?;
     let carrier = carrier(optics, tables);
     let slope = [0, 1].map(|axis| optics.cone(axis, 1.0) / optics.pitch[axis]);
     let tiles = tiles(&layout);
-    let engine = Engine::new(device, optics, layout, tables, h, parameters.rank, sources.len());
+    let engine = Engine::new(device, cloud, layout, tables, h, parameters.rank);
     device.check()?;
     let mut recorder = Recorder::new(device, progress);
     let mut before = None;
     for k in 0..slabs.depths.len() {
         let middle = slabs.plane(k);
         let is_here = |s: &&Source| slabs.index(s.sign * s.distance) == k;
-        let to_dab = |s: &Source| dab(optics, grid, &layout, carrier, s, middle);
+        let to_dab = |s: &Source| dab(cloud, &layout, carrier, s, middle);
         let dabs: Vec<Dab> = sources.par_iter().filter(is_here).map(to_dab).collect();
         let spans: Vec<_> = dabs.par_iter().map(|dab| span(dab, slope, parameters.tail, tiles)).collect();
         // What is written waits in memory until the device has done what came before it.

@@ -6,16 +6,16 @@ use crate::field::Complex32;
 use crate::progress::Progress;
 use pixels::wgpu;
 use rayon::prelude::*;
-use std::sync::mpsc::channel;
+use std::sync::mpsc::{Receiver, channel};
+
+fn buffer(device: &Device, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    device.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+}
 
 /// A buffer for shaders to read and write, dark.
 pub(super) fn storage(device: &Device, label: &str, size: u64) -> wgpu::Buffer {
-    device.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(label),
-        size,
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
-        mapped_at_creation: false,
-    })
+    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
+    buffer(device, label, size, usage)
 }
 
 /// A buffer with contents.
@@ -27,12 +27,8 @@ pub(super) fn upload(device: &Device, label: &str, bytes: &[u8]) -> wgpu::Buffer
 
 /// Constants of a dispatch.
 pub(super) fn uniform(device: &Device, label: &str, bytes: &[u8]) -> wgpu::Buffer {
-    let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(label),
-        size: bytes.len() as u64,
-        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
+    let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+    let buffer = buffer(device, label, bytes.len() as u64, usage);
     device.queue.write_buffer(&buffer, 0, bytes);
     buffer
 }
@@ -47,25 +43,6 @@ pub(super) fn group(device: &Device, pipeline: &wgpu::ComputePipeline, buffers: 
         label: None,
         layout: &pipeline.get_bind_group_layout(0),
         entries: &entries,
-    })
-}
-
-/// Pipelines of a module's entry points.
-pub(super) fn pipelines<const N: usize>(
-    device: &wgpu::Device,
-    source: wgpu::ShaderModuleDescriptor,
-    entries: [&str; N],
-) -> [wgpu::ComputePipeline; N] {
-    let module = device.create_shader_module(source);
-    entries.map(|entry| {
-        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(entry),
-            layout: None,
-            module: &module,
-            entry_point: Some(entry),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            cache: None,
-        })
     })
 }
 
@@ -120,32 +97,47 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// Copies the first samples of a buffer to the host, when all that was submitted is done.
-pub(super) fn fetch(device: &Device, buffer: &wgpu::Buffer, samples: &mut [Complex32]) -> Result<()> {
-    let size = size_of_val(samples) as u64;
-    let staging = device.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("staging"),
-        size,
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, size);
-    device.queue.submit([encoder.finish()]);
-    let (sender, mapped) = channel();
-    staging.map_async(wgpu::MapMode::Read, .., move |result| {
-        // The receiver is gone where the computation was given up.
-        let _ = sender.send(result.map_err(|e| e.to_string()));
-    });
-    let mapped = loop {
-        match mapped.try_recv() {
-            Ok(mapped) => break mapped,
-            Err(_) => device.wait(None)?,
+/// Samples on their way to the host.
+pub(super) struct Readback {
+    staging: wgpu::Buffer,
+    mapped: Receiver<std::result::Result<(), String>>,
+}
+
+impl Readback {
+    /// Begins to copy the first `count` samples of a buffer, behind all that was submitted; then clears the buffer where
+    /// `clear`.
+    pub(super) fn new(device: &Device, buffer: &wgpu::Buffer, count: usize, clear: bool) -> Self {
+        let size = (count * size_of::<Complex32>()) as u64;
+        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+        let staging = self::buffer(device, "staging", size, usage);
+        let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, size);
+        if clear {
+            encoder.clear_buffer(buffer, 0, None);
         }
-    };
-    mapped.map_err(|what| device.failed(what))?;
-    let bytes = staging.slice(..).get_mapped_range();
-    let from: &[Complex32] = bytemuck::cast_slice(&bytes);
-    samples.par_chunks_mut(1 << 16).zip(from.par_chunks(1 << 16)).for_each(|(to, from)| to.copy_from_slice(from));
-    Ok(())
+        device.queue.submit([encoder.finish()]);
+        let (sender, mapped) = channel();
+        staging.map_async(wgpu::MapMode::Read, .., move |result| {
+            // The receiver is gone where the computation was given up.
+            let _ = sender.send(result.map_err(|e| e.to_string()));
+        });
+        Self { staging, mapped }
+    }
+
+    /// Waits for the samples and adds them to those of the host.
+    pub(super) fn add_to(self, device: &Device, samples: &mut [Complex32]) -> Result<()> {
+        let mapped = loop {
+            match self.mapped.try_recv() {
+                Ok(mapped) => break mapped,
+                Err(_) => device.wait(None)?,
+            }
+        };
+        mapped.map_err(|what| device.failed(what))?;
+        let bytes = self.staging.slice(..).get_mapped_range();
+        let from: &[Complex32] = bytemuck::cast_slice(&bytes);
+        samples.par_chunks_mut(1 << 16).zip(from.par_chunks(1 << 16)).for_each(|(to, from)| {
+            to.iter_mut().zip(from).for_each(|(u, add)| *u += add);
+        });
+        Ok(())
+    }
 }

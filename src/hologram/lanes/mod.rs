@@ -169,14 +169,12 @@ macro_rules! dispatch {
     ($set:expr, $kernel:ident($($name:ident: $type:ty),* $(,)?) $(-> $result:ty)?) => {{
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
-        #[allow(clippy::too_many_arguments)] // the kernel's own list
         unsafe fn avx512($($name: $type),*) $(-> $result)? {
             // SAFETY: this function enables the instruction set; the rest is its caller's promise.
             unsafe { $kernel::<$crate::hologram::lanes::Avx512>($($name),*) }
         }
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2,fma")]
-        #[allow(clippy::too_many_arguments)] // the kernel's own list
         unsafe fn avx2($($name: $type),*) $(-> $result)? {
             // SAFETY: as above.
             unsafe { $kernel::<$crate::hologram::lanes::Avx2>($($name),*) }

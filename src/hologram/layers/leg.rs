@@ -7,19 +7,14 @@
 //!    after the last of them transform back, [`Leg::add`];
 //! 3. rows that are wanted are transformed back, [`Leg::shutter`] and [`Leg::land`].
 
-use super::window::Window;
+use super::window::{STRIP, Window};
 use crate::error::Result;
-use crate::field::{Complex32, Field, Grid, plans, zeroed};
+use crate::field::{Complex32, Fft1, Field, Grid, zeroed};
 use crate::hologram::definition::Optics;
 use crate::hologram::dispersion::{Column, Dispersion, aligned};
 use crate::hologram::lanes::{Aligned, InstructionSet, Lanes, cos_sin, dispatch};
 use crate::progress::Progress;
 use rayon::prelude::*;
-use rustfft::Fft;
-use std::sync::Arc;
-
-/// Columns or rows that one task takes together: two cache lines of complex f32.
-pub(super) const STRIP: usize = 16;
 
 /// Distance of neighbouring columns beyond their length: keeps heights of powers of two off one set of the cache.
 const GAP: usize = 16;
@@ -94,8 +89,8 @@ pub(super) struct Leg {
     dispersion: Dispersion,
     /// W by column and row.
     tapers: [Vec<f64>; 2],
-    rows: [Arc<dyn Fft<f32>>; 2],
-    columns: [Arc<dyn Fft<f32>>; 2],
+    rows: Fft1<f32>,
+    columns: Fft1<f32>,
     set: InstructionSet,
 }
 
@@ -107,8 +102,9 @@ impl Leg {
             (0..width).map(|k| optics.taper[0].at(grid.frequency_x(k))).collect(),
             (0..height).map(|k| optics.taper[1].at(grid.frequency_y(k))).collect(),
         ];
-        let dispersion = Dispersion::new([width, height], optics.pitch, optics.wavelength);
-        Ok(Self { optics: *optics, grid, dispersion, tapers, rows: plans(width), columns: plans(height), set })
+        let dispersion = Dispersion::new(&grid, optics.wavelength);
+        let (rows, columns) = (Fft1::new(width), Fft1::new(height));
+        Ok(Self { optics: *optics, grid, dispersion, tapers, rows, columns, set })
     }
 
     /// Its size.
@@ -155,10 +151,10 @@ impl Leg {
 
     /// Transforms the rows of a layer's light.
     pub(super) fn emit(&self, buffers: &mut Buffers, lattice: &Grid, light: &[Complex32], progress: &Progress) {
-        let (width, plan) = (self.grid.width, &self.rows[0]);
+        let width = self.grid.width;
         let rows = &mut buffers.rows[..width * lattice.height];
         rows.par_chunks_mut(width * STRIP).zip(light.par_chunks(lattice.width * STRIP)).for_each_init(
-            || vec![Complex32::default(); plan.get_inplace_scratch_len()],
+            || self.rows.scratch(),
             |scratch, (rows, light)| {
                 for (row, light) in rows.chunks_exact_mut(width).zip(light.chunks_exact(lattice.width)) {
                     if progress.stopped() {
@@ -171,7 +167,7 @@ impl Leg {
                     }
                     row[..lattice.width].copy_from_slice(light);
                     row[lattice.width..].fill(Complex32::default());
-                    plan.process_with_scratch(row, scratch);
+                    self.rows.forward(row, scratch);
                 }
             },
         );
@@ -189,10 +185,9 @@ impl Leg {
     ) {
         let [width, height] = self.size();
         let stride = height + GAP;
-        let (rows, plans) = (&buffers.rows[..width * lattice.height], &self.columns);
-        let scratch = plans.iter().map(|plan| plan.get_inplace_scratch_len()).max().unwrap_or(0);
+        let rows = &buffers.rows[..width * lattice.height];
         buffers.sum[..width * stride].par_chunks_mut(stride * STRIP).enumerate().for_each_init(
-            || (vec![Complex32::default(); STRIP * stride], vec![Complex32::default(); scratch]),
+            || (vec![Complex32::default(); STRIP * stride], self.columns.scratch()),
             |(columns, scratch), (strip, sum)| {
                 let at = strip * STRIP;
                 if progress.stopped() {
@@ -210,13 +205,13 @@ impl Leg {
                     let (column, sum) = (&mut columns[i * stride..][..height], &mut sum[..height]);
                     if !factor.dark(at + i) {
                         column[lattice.height..].fill(Complex32::default());
-                        plans[0].process_with_scratch(column, scratch);
+                        self.columns.forward(column, scratch);
                         self.multiply(factor, at + i, column, sum, first);
                     } else if first {
                         sum.fill(Complex32::default());
                     }
                     if last {
-                        plans[1].process_with_scratch(sum, scratch);
+                        self.columns.inverse(sum, scratch);
                     }
                 }
             },
@@ -250,12 +245,11 @@ impl Leg {
         next: &Self,
         progress: &Progress,
     ) {
-        let (width, plan) = (next.grid.width, &next.rows[0]);
+        let width = next.grid.width;
         let rows = &mut buffers.rows[..width * lattice.height];
-        let scratch = plan.get_inplace_scratch_len();
         let opaque = opaque.par_chunks(lattice.width * STRIP);
         rows.par_chunks_mut(width * STRIP).zip(opaque).enumerate().for_each_init(
-            || (self.lines(), vec![Complex32::default(); scratch]),
+            || (self.lines(), next.rows.scratch()),
             |((lines, back), scratch), (block, (rows, opaque))| {
                 self.rows_back(&buffers.sum, block * STRIP, lines, back, progress);
                 for ((row, opaque), line) in rows
@@ -270,7 +264,7 @@ impl Leg {
                         *u = if hidden { Complex32::default() } else { from };
                     }
                     row[lattice.width..].fill(Complex32::default());
-                    plan.process_with_scratch(row, scratch);
+                    next.rows.forward(row, scratch);
                 }
             },
         );
@@ -292,8 +286,7 @@ impl Leg {
 
     /// Memory of one thread for rows on the way back, and their transforms' scratch.
     fn lines(&self) -> (Vec<Complex32>, Vec<Complex32>) {
-        let scratch = self.rows[1].get_inplace_scratch_len();
-        (vec![Complex32::default(); STRIP * self.grid.width], vec![Complex32::default(); scratch])
+        (vec![Complex32::default(); STRIP * self.grid.width], self.rows.scratch())
     }
 
     /// Rows `first`… of the spectrum whose columns are back already.
@@ -319,7 +312,7 @@ impl Leg {
             if progress.stopped() {
                 return;
             }
-            self.rows[1].process_with_scratch(line, scratch);
+            self.rows.inverse(line, scratch);
         }
     }
 }

@@ -1,8 +1,10 @@
 //! Where a leg's light goes, how far it spreads on the way, and what of it is left out.
 
-use super::leg::STRIP;
 use crate::field::{Grid, fast_length};
 use crate::hologram::definition::Optics;
+
+/// Columns or rows that one task takes together: two cache lines of complex f32.
+pub(super) const STRIP: usize = 16;
 
 /// Samples beyond the cone of the steepest wave that light may take: the tails of its edges.
 const TAIL: usize = 64;

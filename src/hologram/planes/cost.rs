@@ -8,8 +8,6 @@ use super::paint::{self, GROUP};
 use super::spectrum::Spectrum;
 use super::table::Table;
 use super::{Cloud, Dab, Parameters, Slabs};
-use crate::field::Grid;
-use crate::hologram::definition::Optics;
 use crate::hologram::sources::Source;
 
 /// A pixel's part in a column: its factors once a plane, its transform and the sum once a moment [core-seconds].
@@ -43,11 +41,11 @@ const TABLE_BYTE: f64 = 2e-9;
 
 impl Parameters {
     /// Predicted work on the widest instruction set [core-seconds].
-    pub(super) fn core_seconds(&self, optics: &Optics, grid: &Grid, cloud: &Cloud, slabs: &Slabs) -> f64 {
+    pub(super) fn core_seconds(&self, cloud: &Cloud, slabs: &Slabs) -> f64 {
         if cloud.sources.is_empty() {
             return 0.0;
         }
-        let layout = layout(optics, grid, cloud, self, slabs);
+        let (layout, grid) = (layout(cloud, self, slabs), cloud.grid);
         let (planes, rank) = (slabs.depths.len() as f64, self.rank as f64);
         let [width, height] = layout.size.map(|size| size as f64);
         let painted = width * layout.painted as f64;
@@ -56,10 +54,9 @@ impl Parameters {
             + planes * rank * painted * (ROW + CLEARED)
             + width * (height * BACK_COLUMN + grid.height as f64 * BACK_ROW)
             + grid.len() as f64 * WINDOW;
-        let axes = if optics.pitch[0] == optics.pitch[1] { 0..1 } else { 0..2 };
-        let tables: u64 = axes.map(|axis| Table::bytes(optics, axis, slabs.half, self.tail, self.table)).sum();
+        let tables: u64 = self.table_bytes(cloud.optics, slabs.half).iter().sum();
         let points = count * GATHERED;
-        spectra + points + self.painting(optics, cloud, slabs) + tables as f64 * TABLE_BYTE
+        spectra + points + self.painting(cloud, slabs) + tables as f64 * TABLE_BYTE
     }
 
     /// The part of painting.
@@ -68,7 +65,8 @@ impl Parameters {
     /// the union of its kernels: in a crowded bin it lies within a cell and its sizes are alike, in an empty one it is
     /// scattered over the bin. Of m even places or sizes in [0, 1] the largest is m/(m + 1) in the mean, the largest and
     /// the smallest are (m − 1)/(m + 1) apart.
-    fn painting(&self, optics: &Optics, cloud: &Cloud, slabs: &Slabs) -> f64 {
+    fn painting(&self, cloud: &Cloud, slabs: &Slabs) -> f64 {
+        let optics = cloud.optics;
         let (planes, rank) = (slabs.depths.len() as f64, self.rank as f64);
         let count = cloud.sources.len() as f64;
         let cone = [0, 1].map(|axis| optics.cone(axis, slabs.half) / optics.pitch[axis]);
@@ -102,16 +100,14 @@ impl Parameters {
     }
 
     /// Memory beside points and field [bytes].
-    pub(super) fn bytes(&self, optics: &Optics, grid: &Grid, cloud: &Cloud, slabs: &Slabs) -> u64 {
+    pub(super) fn bytes(&self, cloud: &Cloud, slabs: &Slabs) -> u64 {
         if cloud.sources.is_empty() {
             return 0;
         }
-        let layout = layout(optics, grid, cloud, self, slabs);
-        let h = slabs.half;
+        let layout = layout(cloud, self, slabs);
         let plane = (self.rank * layout.size[0] * layout.painted * 8) as u64;
-        let half = [0, 1].map(|axis| Table::half_width(optics, axis, h, self.tail));
-        let axes = if optics.pitch[0] == optics.pitch[1] { 0..1 } else { 0..2 };
-        let tables: u64 = axes.map(|axis| Table::bytes(optics, axis, h, self.tail, self.table)).sum();
+        let half = [0, 1].map(|axis| Table::half_width(cloud.optics, axis, slabs.half, self.tail));
+        let tables: u64 = self.table_bytes(cloud.optics, slabs.half).iter().sum();
         let points =
             cloud.sources.len() as u64 * (size_of::<Source>() + size_of::<Dab>() + paint::ORDER_BYTES + 8) as u64;
         plane + Spectrum::bytes(&layout, self.rank) + paint::bytes(half, self.rank) + tables + points

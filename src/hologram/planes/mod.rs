@@ -28,6 +28,7 @@ use rayon::prelude::*;
 use slabs::Depths;
 use spectrum::Spectrum;
 use std::borrow::Cow;
+use std::sync::Arc;
 
 pub(in crate::hologram) use paint::Dab;
 pub(in crate::hologram) use slabs::Slabs;
@@ -62,6 +63,9 @@ pub(crate) struct Chosen {
 /// What planes need to know of the sources together, gathered in one pass.
 #[derive(Clone, Debug)]
 pub(crate) struct Cloud<'a> {
+    pub(in crate::hologram) optics: &'a Optics,
+    /// The panel.
+    pub(in crate::hologram) grid: &'a Grid,
     /// The sources whose light meets the panel; copied only where some do not.
     pub(in crate::hologram) sources: Cow<'a, [Source]>,
     /// Light by signed distance ζ = −z: it runs from −ζ to the panel at 0 [m].
@@ -76,7 +80,7 @@ pub(crate) struct Cloud<'a> {
 
 impl<'a> Cloud<'a> {
     /// Gathers the sources whose light meets the panel.
-    pub(crate) fn new(optics: &Optics, grid: &Grid, sources: &'a [Source]) -> Self {
+    pub(crate) fn new(optics: &'a Optics, grid: &'a Grid, sources: &'a [Source]) -> Self {
         let slopes = [0, 1].map(|axis| reach(optics, axis, 1.0));
         let meets = |s: &Source| {
             let spans = s.span(grid);
@@ -108,25 +112,38 @@ impl<'a> Cloud<'a> {
         let limit = optics.taper.map(|taper| optics.wavelength * taper.limit);
         let steepness = (tilt(&sources, grid, limit) / (limit[0] * limit[1] / 3.0)).max(1.0);
         let depths = Depths::new(&sources, |s| (s.sign * s.distance, s.amplitude));
-        Self { sources, depths, places, period, steepness }
+        Self { optics, grid, sources, depths, places, period, steepness }
     }
 }
 
 impl Parameters {
+    /// Kernels along x and y, one table for both where they are the same; `half` is the slabs' half depth [m].
+    pub(in crate::hologram) fn tables(&self, optics: &Optics, half: f64, progress: &Progress) -> [Arc<Table>; 2] {
+        let table = |axis| Table::new(optics, axis, half, self.tail, self.table, progress);
+        let first = table(0);
+        let second = if is_square(optics) { Arc::clone(&first) } else { table(1) };
+        [first, second]
+    }
+    /// Memory of each of the tables that there are [bytes].
+    pub(in crate::hologram) fn table_bytes(&self, optics: &Optics, half: f64) -> Vec<u64> {
+        let axes = if is_square(optics) { 0..1 } else { 0..2 };
+        axes.map(|axis| Table::bytes(optics, axis, half, self.tail, self.table)).collect()
+    }
     /// Where the planes stand.
-    pub(in crate::hologram) fn slabs(&self, optics: &Optics, cloud: &Cloud) -> Slabs {
-        cloud.depths.slabs(self.planes, optics.wavelength)
+    pub(in crate::hologram) fn slabs(&self, cloud: &Cloud) -> Slabs {
+        cloud.depths.slabs(self.planes, cloud.optics.wavelength)
     }
     /// Predicted relative L2 error of the field.
-    pub(crate) fn error(&self, optics: &Optics, cloud: &Cloud) -> f64 {
-        let slabs = self.slabs(optics, cloud);
-        self.error_with(optics, cloud, &slabs, cloud.depths.unevenness(&slabs, self.rank))
+    pub(crate) fn error(&self, cloud: &Cloud) -> f64 {
+        let slabs = self.slabs(cloud);
+        self.error_with(cloud, &slabs, cloud.depths.unevenness(&slabs, self.rank))
     }
     /// Its parts are independent, so their squares add up.
-    fn error_with(&self, optics: &Optics, cloud: &Cloud, slabs: &Slabs, unevenness: f64) -> f64 {
+    fn error_with(&self, cloud: &Cloud, slabs: &Slabs, unevenness: f64) -> f64 {
         if cloud.sources.is_empty() {
             return 0.0;
         }
+        let optics = cloud.optics;
         let sine = optics.taper.map(|taper| (optics.wavelength * taper.limit).powi(2));
         let h = slabs.half;
         let first = 0.035 * cloud.steepness * h / optics.wavelength * sine[0] * sine[1];
@@ -137,12 +154,12 @@ impl Parameters {
     }
     /// The cheapest for a wanted error within a memory budget [bytes], or the smallest where none fits; `None` where up to
     /// four moments do not reach the error.
-    pub(crate) fn choose(optics: &Optics, grid: &Grid, cloud: &Cloud, error: f64, memory: u64) -> Option<Chosen> {
+    pub(crate) fn choose(cloud: &Cloud, error: f64, memory: u64) -> Option<Chosen> {
         let table = if error < 5e-4 { Fineness::Fine } else { Fineness::Coarse };
         let mut best: Option<Chosen> = None;
         let mut most = 0;
         for count in [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32] {
-            let slabs = cloud.depths.slabs(count, optics.wavelength);
+            let slabs = cloud.depths.slabs(count, cloud.optics.wavelength);
             // Layers, or one depth, need no more planes than there are.
             let planes = slabs.depths.len().max(1);
             if std::mem::replace(&mut most, planes) == planes {
@@ -152,11 +169,11 @@ impl Parameters {
                 let unevenness = cloud.depths.unevenness(&slabs, rank);
                 let good = (8..36)
                     .map(|tail| Self { planes, rank, tail: f64::from(tail), table })
-                    .map(|parameters| (parameters, parameters.error_with(optics, cloud, &slabs, unevenness)))
+                    .map(|parameters| (parameters, parameters.error_with(cloud, &slabs, unevenness)))
                     .find(|(_, found)| *found <= error);
                 let Some((parameters, found)) = good else { continue };
-                let core_seconds = parameters.core_seconds(optics, grid, cloud, &slabs);
-                let bytes = parameters.bytes(optics, grid, cloud, &slabs);
+                let core_seconds = parameters.core_seconds(cloud, &slabs);
+                let bytes = parameters.bytes(cloud, &slabs);
                 let better = |best: &Chosen| {
                     if best.bytes > memory {
                         bytes < best.bytes
@@ -188,6 +205,11 @@ fn margin(steepness: f64) -> f64 {
     1.45 / (1.0 - corner.powf(1.1)).max(1e-3)
 }
 
+/// Whether both axes have the same kernels.
+fn is_square(optics: &Optics) -> bool {
+    optics.pitch[0] == optics.pitch[1]
+}
+
 /// Where a point's light has died away on the panel, but for the taper's tail [m]: erfc(2.6)/2 = 1.2e-4.
 fn reach(optics: &Optics, axis: usize, distance: f64) -> f64 {
     let sine = (optics.wavelength * optics.taper[axis].reach(2.6)).min(0.9);
@@ -195,20 +217,18 @@ fn reach(optics: &Optics, axis: usize, distance: f64) -> f64 {
 }
 
 /// The periodic grid: large enough that no point's light comes round onto the panel.
-fn layout(optics: &Optics, grid: &Grid, cloud: &Cloud, parameters: &Parameters, slabs: &Slabs) -> Layout {
-    layout_of(optics, grid, cloud, parameters, slabs, &[1, 7, 11])
+fn layout(cloud: &Cloud, parameters: &Parameters, slabs: &Slabs) -> Layout {
+    layout_of(cloud, parameters, slabs, &[1, 7, 11])
 }
 
 /// That grid for transforms of 16·2^a·3^b·5^c times one of `others` samples.
 pub(in crate::hologram) fn layout_of(
-    optics: &Optics,
-    grid: &Grid,
     cloud: &Cloud,
     parameters: &Parameters,
     slabs: &Slabs,
     others: &[usize],
 ) -> Layout {
-    let h = slabs.half;
+    let (optics, grid, h) = (cloud.optics, cloud.grid, slabs.half);
     let mut layout = Layout { size: [0; 2], painted: 0, origin: [0; 2] };
     for (axis, pixels) in [grid.width as f64, grid.height as f64].into_iter().enumerate() {
         let halo = Table::half_width(optics, axis, h, parameters.tail) as f64 + 18.0;
@@ -235,14 +255,8 @@ pub(in crate::hologram) fn carrier(optics: &Optics, tables: [&Table; 2]) -> f64 
 }
 
 /// A source relative to the plane at the signed distance `middle` [m].
-pub(in crate::hologram) fn dab(
-    optics: &Optics,
-    grid: &Grid,
-    layout: &Layout,
-    carrier: f64,
-    s: &Source,
-    middle: f64,
-) -> Dab {
+pub(in crate::hologram) fn dab(cloud: &Cloud, layout: &Layout, carrier: f64, s: &Source, middle: f64) -> Dab {
+    let (optics, grid) = (cloud.optics, cloud.grid);
     let d = s.sign * s.distance - middle;
     let turns = d * carrier + s.turns + 0.25 * s.sign;
     let (sin, cos) = ((turns - turns.round()) * std::f64::consts::TAU).sin_cos();
@@ -252,27 +266,17 @@ pub(in crate::hologram) fn dab(
 }
 
 /// The cloud's field on the panel.
-pub(crate) fn field(
-    grid: &Grid,
-    optics: &Optics,
-    cloud: &Cloud,
-    parameters: &Parameters,
-    set: InstructionSet,
-    progress: &Progress,
-) -> Result<Field> {
-    let sources = &cloud.sources;
+pub(crate) fn field(cloud: &Cloud, parameters: &Parameters, set: InstructionSet, progress: &Progress) -> Result<Field> {
+    let Cloud { optics, grid, sources, .. } = cloud;
     if sources.is_empty() {
-        return Ok(Field::zeros(*grid, optics.wavelength));
+        return Ok(Field::zeros(**grid, optics.wavelength));
     }
-    let slabs = parameters.slabs(optics, cloud);
+    let slabs = parameters.slabs(cloud);
     let h = slabs.half;
-    let layout = layout(optics, grid, cloud, parameters, &slabs);
+    let layout = layout(cloud, parameters, &slabs);
     progress.start("hologram: planes", sources.len() as u64 + (layout.size[0] * slabs.depths.len()) as u64);
-    let same = optics.pitch[0] == optics.pitch[1];
-    let table = |axis| Table::new(optics, axis, h, parameters.tail, parameters.table, progress);
-    let first = table(0);
-    let second = (!same).then(|| table(1));
-    let tables: [&Table; 2] = [&first, second.as_deref().unwrap_or(&first)];
+    let tables = parameters.tables(optics, h, progress);
+    let tables = tables.each_ref().map(|table| &**table);
     progress.check()?;
     let carrier = carrier(optics, tables);
     let slope = [0, 1].map(|axis| optics.cone(axis, 1.0) / optics.pitch[axis]);
@@ -285,7 +289,7 @@ pub(crate) fn field(
     let mut patches = Patches::default();
     for (k, members) in slabs.members(sources, |s| s.sign * s.distance).iter().enumerate() {
         let middle = slabs.plane(k);
-        let one = |&i: &u32| dab(optics, grid, &layout, carrier, &sources[i as usize], middle);
+        let one = |&i: &u32| dab(cloud, &layout, carrier, &sources[i as usize], middle);
         let dabs: Vec<Dab> = members.par_iter().map(one).collect();
         for moment in &mut moments {
             moment.par_chunks_mut(1 << 16).for_each(|part| {

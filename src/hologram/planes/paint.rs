@@ -256,51 +256,52 @@ unsafe fn paint_groups<L: Lanes>(patch: &mut Patch, brush: &Brush, dabs: &[Dab],
                 let (re, im) = (patch.re.values_mut(), patch.im.values_mut());
                 assert!(at + (rows - 1) * width + columns <= re.len() && re.len() == im.len());
                 let (re, im) = (re.as_mut_ptr().add(at), im.as_mut_ptr().add(at));
-                update::<L>(re, im, width, xs.as_ptr(), columns, ys.as_ptr(), rows);
+                let products = Products { xs: xs.as_ptr(), columns, ys: ys.as_ptr(), rows };
+                update::<L>(Target { re, im, stride: width }, products);
             }
         }
     }
 }
 
-/// Adds Σ_n y[row][n]·x[n] to `rows` × `columns` values of a patch.
-#[inline(always)]
-unsafe fn update<L: Lanes>(
-    re: *mut f32,
-    im: *mut f32,
-    stride: usize,
+/// Kernels of a group: Σ_n y[row][n]·x[n] over `rows` × `columns` values.
+#[derive(Clone, Copy)]
+struct Products {
     xs: *const f32,
     columns: usize,
     ys: *const f32,
     rows: usize,
-) {
-    let mut column = 0;
+}
+
+/// Where they are added: values of a patch, `stride` from row to row.
+#[derive(Clone, Copy)]
+struct Target {
+    re: *mut f32,
+    im: *mut f32,
+    stride: usize,
+}
+
+/// Adds products to a patch.
+#[inline(always)]
+unsafe fn update<L: Lanes>(to: Target, products: Products) {
+    let (columns, mut column) = (products.columns, 0);
     // SAFETY: the caller's promise.
     unsafe {
         if L::COUNT == 16 {
             while column + 2 * L::COUNT <= columns {
-                strip::<L, 2>(re, im, stride, xs, columns, ys, rows, column);
+                strip::<L, 2>(to, products, column);
                 column += 2 * L::COUNT;
             }
         }
         while column < columns {
-            strip::<L, 1>(re, im, stride, xs, columns, ys, rows, column);
+            strip::<L, 1>(to, products, column);
             column += L::COUNT;
         }
     }
 }
 
 #[inline(always)]
-#[allow(clippy::too_many_arguments)] // the innermost loop of the engine: every argument is a register
-unsafe fn strip<L: Lanes, const V: usize>(
-    re: *mut f32,
-    im: *mut f32,
-    stride: usize,
-    xs: *const f32,
-    columns: usize,
-    ys: *const f32,
-    rows: usize,
-    column: usize,
-) {
+unsafe fn strip<L: Lanes, const V: usize>(to: Target, products: Products, column: usize) {
+    let (Target { re, im, stride }, Products { xs, columns, ys, rows }) = (to, products);
     // SAFETY: the caller's promise.
     unsafe {
         let zero = L::splat(0.0);

@@ -14,15 +14,13 @@
 use super::slabs::legendre;
 use super::table::mean_square;
 use crate::error::Result;
-use crate::field::{Complex32, Field, Grid, plans, zeroed};
+use crate::field::{Complex32, Fft1, Field, Grid, zeroed};
 use crate::hologram::definition::Optics;
 use crate::hologram::dispersion::{Column, Dispersion, aligned};
 use crate::hologram::lanes::{Aligned, InstructionSet, Lanes, cos_sin, dispatch};
 use crate::progress::Progress;
 use rayon::prelude::*;
-use rustfft::Fft;
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 /// Columns or rows that one task takes together: two cache lines of complex f32.
 const STRIP: usize = 16;
@@ -41,22 +39,46 @@ pub(in crate::hologram) struct Layout {
     pub(in crate::hologram) origin: [i64; 2],
 }
 
-/// Phases of one plane, in turns.
-struct Carrier {
+impl Layout {
+    /// The grid of the transforms.
+    pub(in crate::hologram) fn grid(&self, optics: &Optics) -> Grid {
+        let ([width, height], [pitch_x, pitch_y]) = (self.size, optics.pitch);
+        Grid { width, height, pitch_x, pitch_y, center: [0.0; 2] }
+    }
+}
+
+/// One plane on its way into the spectrum.
+struct Plane<'a> {
+    /// Its moments, rows transformed.
+    moments: &'a [Vec<Complex32>],
     /// ζ/λ, ζ the plane's signed distance before the panel.
     ratio: f64,
-    /// ζ·(S(f_y) − 1/λ) modulo one, by row of the transform.
+    /// ζ·(S(f_y) − 1/λ) modulo one, by row of the transform [turns].
     rows: Aligned,
+    /// Whether it is the first: the spectrum begins with it.
+    first: bool,
+}
+
+/// What a plane's moments are multiplied by in one column of the spectrum.
+struct ColumnFactor<'a> {
+    a: f64,
+    /// ζ·S(f_x) modulo one [turns].
+    base: f32,
+    /// C, and the amplitude.
+    residual: &'a [f32],
+    amplitude: &'a [f32],
 }
 
 /// What the columns share.
 struct Shared {
+    layout: Layout,
     /// Where the taper is dark: largest λ²f² along each axis.
     limit: [f64; 2],
     dispersion: Dispersion,
     /// λ²·mean f² of each axis and 2πh/λ.
     mean: [f64; 2],
     kappa: f64,
+    columns: Fft1<f32>,
     set: InstructionSet,
 }
 
@@ -64,11 +86,9 @@ struct Shared {
 ///
 /// Columns stand one after another, `height` + [`GAP`] samples each.
 pub(super) struct Spectrum {
-    layout: Layout,
     shared: Shared,
     wavelength: f64,
-    rows: [Arc<dyn Fft<f32>>; 2],
-    columns: [Arc<dyn Fft<f32>>; 2],
+    rows: Fft1<f32>,
     sum: Vec<Complex32>,
     /// Whether no plane was added yet.
     dark: bool,
@@ -78,17 +98,17 @@ impl Spectrum {
     /// A dark one; `depth` is h [m].
     pub(super) fn new(optics: &Optics, layout: &Layout, depth: f64, set: InstructionSet) -> Self {
         let [width, height] = layout.size;
-        let (rows, columns) = (plans(width), plans(height));
         let lambda = optics.wavelength;
         let shared = Shared {
+            layout: *layout,
             limit: optics.taper.map(|taper| (lambda * taper.reach(5.0)).powi(2)),
-            dispersion: Dispersion::new(layout.size, optics.pitch, lambda),
+            dispersion: Dispersion::new(&layout.grid(optics), lambda),
             mean: [0, 1].map(|axis| lambda * lambda * mean_square(optics, axis)),
             kappa: TAU * depth / lambda,
+            columns: Fft1::new(height),
             set,
         };
-        let sum = zeroed(width * (height + GAP));
-        Self { layout: *layout, shared, wavelength: lambda, rows, columns, sum, dark: true }
+        Self { shared, wavelength: lambda, rows: Fft1::new(width), sum: zeroed(width * (height + GAP)), dark: true }
     }
 
     /// Memory of the spectrum and of the threads that work on it [bytes].
@@ -102,29 +122,26 @@ impl Spectrum {
 
     /// Adds a plane at the signed distance ζ before the panel [m]; its moments are transformed in place.
     pub(super) fn add(&mut self, distance: f64, moments: &mut [Vec<Complex32>], progress: &Progress) -> Result<()> {
-        let [width, height] = self.layout.size;
-        let plan = &self.rows[0];
+        let [width, height] = self.shared.layout.size;
         for moment in moments.iter_mut() {
             moment.par_chunks_mut(width * STRIP).for_each_init(
-                || vec![Complex32::default(); plan.get_inplace_scratch_len()],
+                || self.rows.scratch(),
                 |scratch, rows| {
                     if !progress.stopped() {
-                        plan.process_with_scratch(rows, scratch);
+                        self.rows.forward(rows, scratch);
                     }
                 },
             );
         }
         progress.check()?;
-        let ratio = distance / self.wavelength;
-        let rows = self.shared.dispersion.by_row(ratio, |_| 0.0);
-        let carrier = Carrier { ratio, rows };
-        let (layout, shared, plan, moments) = (&self.layout, &self.shared, &self.columns[0], &*moments);
-        let dark = std::mem::replace(&mut self.dark, false);
+        let (shared, ratio) = (&self.shared, distance / self.wavelength);
+        let first = std::mem::replace(&mut self.dark, false);
+        let plane = Plane { moments, ratio, rows: shared.dispersion.by_row(ratio, |_| 0.0), first };
         self.sum.par_chunks_mut((height + GAP) * STRIP).enumerate().for_each_init(
-            || Strip::new(layout, moments.len(), plan),
+            || Strip::new(shared, plane.moments.len()),
             |strip, (index, sum)| {
                 if !progress.stopped() {
-                    strip.add(index * STRIP, layout, moments, &carrier, shared, plan, sum, dark);
+                    strip.add(index * STRIP, shared, &plane, sum);
                     progress.advance(STRIP as u64);
                 }
             },
@@ -134,41 +151,40 @@ impl Spectrum {
 
     /// Transforms back: the field in the panel's window.
     pub(super) fn finish(mut self, grid: &Grid, progress: &Progress) -> Result<Field> {
-        let [width, height] = self.layout.size;
-        let stride = height + GAP;
-        let plan = &self.columns[1];
-        let scale = 1.0 / (width as f32 * height as f32);
         let shared = &self.shared;
+        let ([width, height], origin) = (shared.layout.size, shared.layout.origin);
+        let stride = height + GAP;
+        let scale = 1.0 / (width as f32 * height as f32);
         self.sum.par_chunks_mut(stride * STRIP).enumerate().for_each_init(
-            || vec![Complex32::default(); plan.get_inplace_scratch_len()],
+            || shared.columns.scratch(),
             |scratch, (index, columns)| {
                 for (column, a) in columns.chunks_exact_mut(stride).zip(&shared.dispersion.columns[index * STRIP..]) {
                     if *a <= shared.limit[0] && !progress.stopped() {
-                        plan.process_with_scratch(&mut column[..height], scratch);
+                        shared.columns.inverse(&mut column[..height], scratch);
                     }
                 }
             },
         );
         progress.check()?;
-        let (layout, sum, plan) = (&self.layout, &self.sum, &self.rows[1]);
+        let sum = &self.sum;
         let mut field = Field::zeros(*grid, self.wavelength);
         field.samples.par_chunks_mut(grid.width * STRIP).enumerate().for_each_init(
-            || (vec![Complex32::default(); STRIP * width], vec![Complex32::default(); plan.get_inplace_scratch_len()]),
+            || (vec![Complex32::default(); STRIP * width], self.rows.scratch()),
             |(lines, scratch), (block, samples)| {
                 if progress.stopped() {
                     return;
                 }
                 let count = samples.len() / grid.width;
-                let places: [usize; STRIP] = std::array::from_fn(|i| wrap(block * STRIP + i, layout.origin[1], height));
+                let places: [usize; STRIP] = std::array::from_fn(|i| wrap(block * STRIP + i, origin[1], height));
                 for (column, from) in sum.chunks_exact(stride).enumerate() {
                     for (i, &row) in places[..count].iter().enumerate() {
                         lines[i * width + column] = from[row] * scale;
                     }
                 }
                 for (line, row) in lines.chunks_exact_mut(width).zip(samples.chunks_exact_mut(grid.width)) {
-                    plan.process_with_scratch(line, scratch);
+                    self.rows.inverse(line, scratch);
                     for (column, u) in row.iter_mut().enumerate() {
-                        *u = line[wrap(column, layout.origin[0], width)];
+                        *u = line[wrap(column, origin[0], width)];
                     }
                 }
             },
@@ -194,49 +210,36 @@ struct Strip {
 }
 
 impl Strip {
-    fn new(layout: &Layout, rank: usize, plan: &Arc<dyn Fft<f32>>) -> Self {
-        let height = layout.size[1];
-        let zero = Complex32::default();
+    fn new(shared: &Shared, rank: usize) -> Self {
+        let height = shared.layout.size[1];
         Self {
-            columns: vec![vec![zero; STRIP * (height + GAP)]; rank],
+            columns: vec![vec![Complex32::default(); STRIP * (height + GAP)]; rank],
             residual: aligned(height),
             amplitude: aligned(height),
-            scratch: vec![zero; plan.get_inplace_scratch_len()],
+            scratch: shared.columns.scratch(),
         }
     }
 
     /// Transforms columns `first`… of a plane's moments and adds them to those of the spectrum.
-    #[allow(clippy::too_many_arguments)] // one strip's place in what all strips share
-    fn add(
-        &mut self,
-        first: usize,
-        layout: &Layout,
-        moments: &[Vec<Complex32>],
-        carrier: &Carrier,
-        shared: &Shared,
-        plan: &Arc<dyn Fft<f32>>,
-        sum: &mut [Complex32],
-        dark: bool,
-    ) {
-        let [width, height] = layout.size;
+    fn add(&mut self, first: usize, shared: &Shared, plane: &Plane, sum: &mut [Complex32]) {
+        let Layout { size: [width, height], painted, .. } = shared.layout;
         let stride = height + GAP;
         // Beyond its taper a column is dark, and its residual phase without bound.
         let lit: [bool; STRIP] = std::array::from_fn(|i| shared.dispersion.columns[first + i] <= shared.limit[0]);
-        for (moment, columns) in moments.iter().zip(&mut self.columns) {
-            for row in 0..layout.painted {
+        for (moment, columns) in plane.moments.iter().zip(&mut self.columns) {
+            for row in 0..painted {
                 let from = &moment[row * width + first..row * width + first + STRIP];
                 for (i, &u) in from.iter().enumerate() {
                     columns[i * stride + row] = u;
                 }
             }
             for (column, _) in columns.chunks_exact_mut(stride).zip(lit).filter(|&(_, lit)| lit) {
-                column[layout.painted..].fill(Complex32::default());
-                plan.process_with_scratch(&mut column[..height], &mut self.scratch);
+                column[painted..].fill(Complex32::default());
+                shared.columns.forward(&mut column[..height], &mut self.scratch);
             }
         }
         for i in (0..STRIP).filter(|&i| lit[i]) {
             let a = shared.dispersion.columns[first + i];
-            let base = shared.dispersion.by_column(carrier.ratio, first + i, 0.0);
             let range = i * stride..i * stride + height;
             let moments: Vec<&[Complex32]> = self.columns.iter().map(|columns| &columns[range.clone()]).collect();
             let (moments, sum) = (&moments[..], &mut sum[range]);
@@ -246,10 +249,12 @@ impl Strip {
             unsafe {
                 dispatch!(shared.set, prepare(shared: &Shared, a: f64, limit: f32, residual: &mut Aligned, amplitude: &mut Aligned));
             }
-            let (residual, amplitude) = (self.residual.values(), self.amplitude.values());
+            let base = shared.dispersion.by_column(plane.ratio, first + i, 0.0);
+            let column =
+                &ColumnFactor { a, base, residual: self.residual.values(), amplitude: self.amplitude.values() };
             // SAFETY: as above.
             unsafe {
-                dispatch!(shared.set, accumulate(shared: &Shared, carrier: &Carrier, base: f32, a: f64, residual: &[f32], amplitude: &[f32], moments: &[&[Complex32]], sum: &mut [Complex32], dark: bool));
+                dispatch!(shared.set, accumulate(shared: &Shared, plane: &Plane, column: &ColumnFactor, moments: &[&[Complex32]], sum: &mut [Complex32]));
             }
         }
     }
@@ -281,25 +286,22 @@ unsafe fn prepare<L: Lanes>(shared: &Shared, a: f64, limit: f32, residual: &mut 
     }
 }
 
-/// Adds the moments of one plane, one column, to the sum, or begins the sum with them where it is dark.
+/// Adds the moments of one plane, one column, to the sum, or begins the sum with those of the first.
 ///
 /// # Safety
 /// The instruction set of `L` must be enabled.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)] // one column's state, kept out of structs that would be built per column
 unsafe fn accumulate<L: Lanes>(
     shared: &Shared,
-    carrier: &Carrier,
-    base: f32,
-    a: f64,
-    residual: &[f32],
-    amplitude: &[f32],
+    plane: &Plane,
+    column: &ColumnFactor,
     moments: &[&[Complex32]],
     sum: &mut [Complex32],
-    dark: bool,
 ) {
     let count = sum.len();
-    let (squares, rows) = (shared.dispersion.squares.values(), carrier.rows.values());
+    let ColumnFactor { a, base, residual, amplitude } = *column;
+    let first = plane.first;
+    let (squares, rows) = (shared.dispersion.squares.values(), plane.rows.values());
     let lengths = [residual.len(), amplitude.len(), squares.len(), rows.len()];
     assert!(count.is_multiple_of(16) && lengths.iter().all(|&n| n >= count));
     assert!(moments.iter().all(|moment| moment.len() == count));
@@ -311,7 +313,7 @@ unsafe fn accumulate<L: Lanes>(
         let constant = L::splat((0.25 * (my * a - mx * my)) as f32);
         let slope = L::splat((0.25 * mx) as f32);
         let scale = L::splat(shared.kappa as f32);
-        let (base, ratio) = (L::splat(base), L::splat(carrier.ratio as f32));
+        let (base, ratio) = (L::splat(base), L::splat(plane.ratio as f32));
         while k < count {
             let c = L::load(residual.as_ptr().add(k));
             let phase = c.fma(ratio, L::load(rows.as_ptr().add(k)).add(base));
@@ -321,7 +323,7 @@ unsafe fn accumulate<L: Lanes>(
             let x = L::load(squares.as_ptr().add(k)).fma(slope, constant).add(c).mul(scale);
             let to = sum.as_mut_ptr().cast::<f32>().add(2 * k);
             // Fresh memory is not read: see [`zeroed`].
-            let (mut re, mut im) = if dark { (L::splat(0.0), L::splat(0.0)) } else { L::load_complex(to) };
+            let (mut re, mut im) = if first { (L::splat(0.0), L::splat(0.0)) } else { L::load_complex(to) };
             let weights = legendre::<L>(x, moments.len());
             for (moment, weight) in moments.iter().zip(weights) {
                 let (ur, ui) = L::load_complex(moment.as_ptr().cast::<f32>().add(2 * k));

@@ -9,7 +9,7 @@
 //! separable fit of f_z − 1/λ: the product of two such kernels is the point's band-limited wave but for the residual
 //! that the spectrum corrects ([`super::spectrum`]).
 
-use crate::field::{Complex64, plans};
+use crate::field::{Complex64, Fft1};
 use crate::hologram::definition::Optics;
 use crate::hologram::lanes::{Aligned, Lanes};
 use crate::progress::Progress;
@@ -170,12 +170,12 @@ impl Table {
                 (k.rem_euclid(count as isize) as usize, weight, alpha(optics, axis, f) - mean)
             })
             .collect();
-        let [_, plan] = plans::<f64>(count);
+        let plan = Fft1::new(count);
         let mut values = Aligned::default();
         values.reserve(levels * (phases + 1) * 2 * row);
         let level_values = (phases + 1) * 2 * row;
         values.values_mut()[..levels * level_values].par_chunks_mut(level_values).enumerate().for_each_init(
-            || (vec![Complex64::default(); count], vec![Complex64::default(); plan.get_inplace_scratch_len()]),
+            || (vec![Complex64::default(); count], plan.scratch()),
             |(line, scratch), (level, out)| {
                 if progress.stopped() {
                     return;
@@ -186,7 +186,7 @@ impl Table {
                 for &(k, weight, alpha) in &spectrum {
                     line[k] = Complex64::cis(TAU * d * alpha) * weight;
                 }
-                plan.process_with_scratch(line, scratch);
+                plan.inverse(line, scratch);
                 for (phase, rows) in out.chunks_exact_mut(2 * row).enumerate() {
                     let (re, im) = rows.split_at_mut(row);
                     for i in 0..2 * half + 2 {

@@ -7,7 +7,8 @@
 
 use super::batch::{BATCH, Batch};
 use super::factor::{Factor, Job, Relative, evaluate};
-use super::kernel::{COLUMNS, LONG_BATCH, Panels};
+use super::kernel::{LONG_BATCH, Panels};
+use super::shape::COLUMNS;
 use crate::hologram::lanes::Avx512;
 use crate::hologram::lanes::matrix::{BLOCK, SIDE, Unit};
 use std::arch::x86_64::*;

@@ -11,7 +11,8 @@
 use super::batch::{BATCH, Batch};
 use super::factor::{self, Factor, Job, Relative};
 use super::fixed::{FULL, Indexes, LONGEST, Strength, UNIT, Wave, evaluate, pair};
-use super::kernel::{COLUMNS, Panels, ROWS, stride};
+use super::kernel::{Panels, ROWS, stride};
+use super::shape::COLUMNS;
 use crate::hologram::lanes::Avx512;
 use std::arch::x86_64::*;
 
@@ -29,12 +30,27 @@ const LARGEST: i64 = {
 // |re|, |im| of a batch's sums fit 32 bits; a part's and a sum of parts' fit 16.
 const _: () = assert!(BATCH as i64 * LARGEST * LARGEST < 1 << 31 && 2 * LARGEST < 1 << 15);
 
-/// Where factors go, in 32-bit lanes: steps of a pair of points, of a part, of a block of vectors, vectors of a block.
-struct Layout {
+/// The factors of one axis, in 32-bit lanes.
+struct Panel {
+    axis: usize,
+    /// What [`UNIT`] stands for.
+    unit: f64,
+    /// Half the tile [px], and its vectors.
+    half: f64,
+    vectors: usize,
+    /// Steps of a pair of points, of a part, of a block of vectors, vectors of a block.
     pair: usize,
     part: usize,
     block: usize,
-    vectors: usize,
+    in_block: usize,
+    to: *mut i32,
+}
+
+/// A block of a tile, whose rows are `width` values.
+struct Block {
+    re: *mut f32,
+    im: *mut f32,
+    width: usize,
 }
 
 /// Adds a batch of points to the tile in `panels`.
@@ -51,17 +67,37 @@ pub(super) unsafe fn add_batch(job: &Job, points: &[Relative], panels: &mut Pane
     if unit[0] == 0.0 {
         return;
     }
-    let columns = Layout { pair: 3 * COLUMNS, part: COLUMNS, block: PAIRS * 3 * COLUMNS, vectors: COLUMNS / 16 };
     let stride = stride(job.height);
-    let rows = Layout { pair: 3 * stride, part: stride, block: 16, vectors: 1 };
     let x = panels.x.values_mut();
     let y = panels.y.values_mut();
     assert!(x.len() >= PAIRS * 3 * job.width && y.len() >= PAIRS * 3 * stride);
     let (x, y) = (x.as_mut_ptr().cast::<i32>(), y.as_mut_ptr().cast::<i32>());
+    let columns = Panel {
+        axis: 0,
+        unit: unit[0],
+        half: half[0],
+        vectors: job.width / 16,
+        pair: 3 * COLUMNS,
+        part: COLUMNS,
+        block: PAIRS * 3 * COLUMNS,
+        in_block: COLUMNS / 16,
+        to: x,
+    };
+    let rows = Panel {
+        axis: 1,
+        unit: unit[1],
+        half: half[1],
+        vectors: job.height.div_ceil(16),
+        pair: 3 * stride,
+        part: stride,
+        block: 16,
+        in_block: 1,
+        to: y,
+    };
     // SAFETY: as asserted.
     unsafe {
-        fill(job, points, &batch, 0, unit[0], half[0], job.width / 16, &columns, x);
-        fill(job, points, &batch, 1, unit[1], half[1], job.height.div_ceil(16), &rows, y);
+        fill(job, points, &batch, &columns);
+        fill(job, points, &batch, &rows);
     }
     let scale = (unit[0] * unit[1] / (UNIT * UNIT)) as f32;
     let (re, im) = (panels.re.values_mut(), panels.im.values_mut());
@@ -71,9 +107,9 @@ pub(super) unsafe fn add_batch(job: &Job, points: &[Relative], panels: &mut Pane
             let at = row * ROWS * job.width + column * COLUMNS;
             // SAFETY: the block lies inside the tile, every pair's factors were filled above.
             unsafe {
-                let (re, im) = (re.as_mut_ptr().add(at), im.as_mut_ptr().add(at));
+                let to = Block { re: re.as_mut_ptr().add(at), im: im.as_mut_ptr().add(at), width: job.width };
                 let (x, y) = (x.add(column * columns.block), y.add(row * ROWS));
-                product(points.len().div_ceil(2), x, y, stride, re, im, job.width, scale);
+                product(points.len().div_ceil(2), x, y, stride, &to, scale);
             }
         }
     }
@@ -82,19 +118,9 @@ pub(super) unsafe fn add_batch(job: &Job, points: &[Relative], panels: &mut Pane
 /// Factors of every pair along an axis.
 #[inline]
 #[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl,avx512vnni,avx2,fma")]
-#[allow(clippy::too_many_arguments)] // one axis's part of the kernel
-unsafe fn fill(
-    job: &Job,
-    points: &[Relative],
-    batch: &Batch,
-    axis: usize,
-    unit: f64,
-    half: f64,
-    vectors: usize,
-    layout: &Layout,
-    to: *mut i32,
-) {
-    let inverse = 1.0 / unit;
+unsafe fn fill(job: &Job, points: &[Relative], batch: &Batch, panel: &Panel) {
+    let Panel { axis, half, vectors, to, .. } = *panel;
+    let inverse = 1.0 / panel.unit;
     let amplitude = |k: usize| inverse * if axis == 0 { batch.amplitude[k] } else { 1.0 };
     let wave = |k: usize| {
         let [base, first, second, third] = &batch.waves[axis];
@@ -109,9 +135,8 @@ unsafe fn fill(
     let start = Indexes::from(-half as f32);
     for number in 0..points.len().div_ceil(2) {
         let [first, second] = [2 * number, 2 * number + 1];
-        let place = |vector: usize| {
-            number * layout.pair + vector / layout.vectors * layout.block + vector % layout.vectors * 16
-        };
+        let place =
+            |vector: usize| number * panel.pair + vector / panel.in_block * panel.block + vector % panel.in_block * 16;
         let mut at = start;
         if batch.edge[axis][first] > 0.0 || batch.edge[axis][second] > 0.0 {
             let [first, second] = [tapered(first), tapered(second)];
@@ -121,7 +146,7 @@ unsafe fn fill(
                 unsafe {
                     let (a, b) = (rounded(&first, at.u), rounded(&second, at.u));
                     let (re, im) = (pair(a.0, b.0), pair(a.1, b.1));
-                    put([re, im, _mm512_add_epi16(re, im)], to.add(place(vector)), layout.part);
+                    put([re, im, _mm512_add_epi16(re, im)], to.add(place(vector)), panel.part);
                 }
                 at = at.next();
             }
@@ -129,7 +154,7 @@ unsafe fn fill(
             let (waves, strengths) = ([wave(first), wave(second)], [strength(first), strength(second)]);
             for vector in 0..vectors {
                 // SAFETY: as above.
-                unsafe { put(evaluate(waves, strengths, at), to.add(place(vector)), layout.part) };
+                unsafe { put(evaluate(waves, strengths, at), to.add(place(vector)), panel.part) };
                 at = at.next();
             }
         }
@@ -171,17 +196,8 @@ unsafe fn put(parts: [__m512i; 3], to: *mut i32, step: usize) {
 /// Adds scale·Σ y·x to a block of `ROWS` rows × `COLUMNS` columns of the tile.
 #[inline]
 #[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl,avx512vnni,avx2,fma")]
-#[allow(clippy::too_many_arguments)] // two panels and the tile
-unsafe fn product(
-    pairs: usize,
-    mut x: *const i32,
-    mut y: *const i32,
-    stride: usize,
-    re: *mut f32,
-    im: *mut f32,
-    width: usize,
-    scale: f32,
-) {
+unsafe fn product(pairs: usize, mut x: *const i32, mut y: *const i32, stride: usize, block: &Block, scale: f32) {
+    let Block { re, im, width } = *block;
     const V: usize = COLUMNS / 16;
     let mut sums = [[[_mm512_setzero_si512(); V]; ROWS]; 3];
     for _ in 0..pairs {

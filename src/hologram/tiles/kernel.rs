@@ -6,7 +6,7 @@
 
 use super::batch::{BATCH, Batch};
 use super::factor::{Job, Relative, evaluate};
-use super::shape::Kernel;
+use super::shape::{COLUMNS, Kernel};
 use crate::hologram::lanes::{Aligned, Lanes};
 
 /// Points of a batch for the matrix unit: its sums are read and written less often.
@@ -22,9 +22,6 @@ pub(super) const fn batch(kernel: Kernel) -> usize {
 
 /// Rows of the product's register block.
 pub(super) const ROWS: usize = 4;
-
-/// Columns that a tile's width is a multiple of.
-pub(super) const COLUMNS: usize = 32;
 
 /// Memory of one thread: the factors of a batch and the tile that they are summed into.
 #[derive(Debug, Default)]

@@ -32,15 +32,14 @@ use super::definition::Optics;
 #[cfg(target_arch = "x86_64")]
 use super::lanes::matrix::Amx;
 use super::lanes::{InstructionSet, dispatch};
-use super::sources::{Source, contrast, tilt};
+use super::sources::{PointSum, Source, contrast, tilt};
 use crate::error::Result;
-use crate::field::{Complex32, Field, Grid};
-use crate::progress::Progress;
+use crate::field::{Complex32, Field};
 use factor::{Job, Relative};
 use kernel::{LONG_BATCH, Panels, add_batch};
 use pixels::add_exact;
 use rayon::prelude::*;
-use shape::Seen;
+use shape::Lighting;
 
 /// Tiles whose results wait together to be added to the field.
 const WAVE: usize = 64;
@@ -76,7 +75,8 @@ impl Class {
         WAVE as u64 * tile + table + (size_of::<Source>() * self.sources.len()) as u64
     }
     /// Predicted work on AVX-512 [core-seconds]: that of each point on each tile that its cone touches.
-    pub(crate) fn core_seconds(&self, optics: &Optics, grid: &Grid, sources: &[Source], cull: Cull) -> f64 {
+    pub(crate) fn core_seconds(&self, sum: &PointSum) -> f64 {
+        let PointSum { optics, grid, sources, cull, .. } = *sum;
         let (width, height) = (self.shape.width as f64, self.shape.height as f64);
         let tile = self.shape.seconds();
         let count = |source: &Source| {
@@ -105,11 +105,11 @@ impl Class {
         self.sources.par_iter().map(|&i| sources[i]).collect()
     }
     /// The taper's table for the class's distances; empty where waves are not tapered, dark when asked to stop.
-    pub(crate) fn edges(&self, optics: &Optics, cull: Cull, progress: &Progress) -> EdgeTable {
-        match cull {
+    pub(crate) fn edges(&self, sum: &PointSum) -> EdgeTable {
+        match sum.cull {
             Cull::Soft => {
-                let [lowest, highest] = self.q_range(optics);
-                EdgeTable::new(lowest, highest, progress)
+                let [lowest, highest] = self.q_range(sum.optics);
+                EdgeTable::new(lowest, highest, sum.progress)
             }
             Cull::Hard | Cull::None => EdgeTable::default(),
         }
@@ -145,17 +145,8 @@ fn ordered(x: f64) -> i64 {
 
 /// Sorts sources into classes, a factor √2 of distance each, and chooses their tiles; leaves some out when asked to
 /// stop.
-#[allow(clippy::too_many_arguments)] // what a division knows
-pub(crate) fn classify(
-    optics: &Optics,
-    grid: &Grid,
-    sources: &[Source],
-    indexes: &[usize],
-    cull: Cull,
-    products: Products,
-    error: f64,
-    progress: &Progress,
-) -> Vec<Class> {
+pub(crate) fn classify(sum: &PointSum, indexes: &[usize], products: Products, error: f64) -> Vec<Class> {
+    let PointSum { optics, grid, sources, cull, progress } = *sum;
     let Some(nearest) = indexes.iter().map(|&i| sources[i].distance).min_by(f64::total_cmp) else {
         return Vec::new();
     };
@@ -188,38 +179,30 @@ pub(crate) fn classify(
                 || ([f64::INFINITY, 0.0], [0.0; 2]),
                 |(d, s), (e, t)| ([d[0].min(e[0]), d[1].max(e[1])], [s[0].max(t[0]), s[1].max(t[1])]),
             );
-            let seen = Seen {
+            let lighting = Lighting {
                 panel: [grid.width, grid.height],
                 distance: distance[0].max(1e-12),
                 sine,
                 tilt: tilt(&chosen, grid, limit),
                 contrast: contrast(&chosen, grid, limit),
             };
-            let shape = Shape::choose(optics, &seen, products, error);
+            let shape = Shape::choose(optics, &lighting, products, error);
             Class { sources: members, shape, distance }
         })
         .collect()
 }
 
 /// Adds the sources of a class to the field.
-pub(crate) fn add(
-    field: &mut Field,
-    optics: &Optics,
-    sources: &[Source],
-    class: &Class,
-    cull: Cull,
-    set: InstructionSet,
-    progress: &Progress,
-) -> Result<()> {
-    let table = class.edges(optics, cull, progress);
-    let limit = Limit::new(cull, &table);
+pub(crate) fn add(field: &mut Field, sum: &PointSum, class: &Class, set: InstructionSet) -> Result<()> {
+    let PointSum { optics, grid, progress, .. } = *sum;
+    let table = class.edges(sum);
+    let limit = Limit::new(sum.cull, &table);
     let axes = [Axis::new(optics, 0, limit), Axis::new(optics, 1, limit)];
     let Shape { width, height, kernel, .. } = class.shape;
     let job = Job { width, height, axes: &axes, wavenumber: 1.0 / optics.wavelength, limit };
     let most = kernel::batch(kernel);
-    let members = class.members(sources);
+    let members = class.members(sum.sources);
     let tangent = class.tangent(optics, limit);
-    let grid = field.grid;
     let across = grid.width.div_ceil(width);
     let tiles: Vec<usize> = (0..across * grid.height.div_ceil(height)).collect();
     let work = (members.len() as u64).max(1);
@@ -230,10 +213,7 @@ pub(crate) fn add(
                 let at = [tile % across * width, tile / across * height];
                 let mut panels = Panels::default();
                 panels.clear(width, height, kernel);
-                let center = [
-                    grid.x(at[0]) + 0.5 * (width as f64 - 1.0) * grid.pitch_x,
-                    grid.y(at[1]) - 0.5 * (height as f64 - 1.0) * grid.pitch_y,
-                ];
+                let center = grid.middle(at, [width, height]);
                 let half = [0.5 * width as f64 * grid.pitch_x, 0.5 * height as f64 * grid.pitch_y];
                 let reach = half[0] + tangent[0] * class.distance[1];
                 let first = members.partition_point(|s| s.x < center[0] - reach);

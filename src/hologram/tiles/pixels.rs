@@ -1,7 +1,8 @@
 //! The inner loop where the sphere is not separable over a tile: every pixel from its own path.
 
 use super::factor::{Axis, Job, Limit, Relative, taper};
-use super::kernel::{COLUMNS, Panels};
+use super::kernel::Panels;
+use super::shape::COLUMNS;
 use crate::hologram::lanes::{Lanes, cos_sin};
 
 /// Adds a batch of points to the tile pixel by pixel, with the exact path: for angles and distances at which the

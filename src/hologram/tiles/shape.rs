@@ -1,6 +1,5 @@
 //! How large a tile may be: the bounds on what the separable expansion leaves out.
 
-use super::kernel::COLUMNS;
 use crate::hologram::definition::Optics;
 use crate::hologram::lanes::InstructionSet;
 use std::f64::consts::TAU;
@@ -52,9 +51,9 @@ impl Products {
         }
     }
     /// Kernels that keep an error for such points, and the rounding of each.
-    fn kernels(self, seen: &Seen, error: f64) -> Vec<(Kernel, f64)> {
+    fn kernels(self, lighting: &Lighting, error: f64) -> Vec<(Kernel, f64)> {
         let mut kernels = vec![(Kernel::Float, 0.0)];
-        let noise = integer_noise(seen);
+        let noise = integer_noise(lighting);
         // Where integers are allowed they are quicker than f32 on any tile.
         if matches!(self, Self::Integer | Self::Bfloat) && noise <= INTEGER_PART * error {
             kernels = vec![(Kernel::Integer, noise)];
@@ -65,6 +64,9 @@ impl Products {
         kernels
     }
 }
+
+/// Columns that a tile's width is a multiple of.
+pub(super) const COLUMNS: usize = 32;
 
 /// Columns and rows of the shaders' tiles.
 pub(crate) const SHADER: usize = 32;
@@ -84,7 +86,7 @@ pub(crate) struct Shape {
 
 /// What the choice of a shape needs to know of a class.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct Lighting {
     /// Columns and rows of the panel.
     pub(super) panel: [usize; 2],
     /// Smallest distance [m].
@@ -125,7 +127,7 @@ const BFLOAT_PAIR: f64 = 4.3e-12;
 
 impl Shape {
     /// The tile of least work whose error stays below `error`.
-    pub(super) fn choose(optics: &Optics, seen: &Seen, products: Products, error: f64) -> Self {
+    pub(super) fn choose(optics: &Optics, lighting: &Lighting, products: Products, error: f64) -> Self {
         let heights = match products {
             Products::Shader => SHADER..=SHADER,
             Products::Float | Products::Integer | Products::Bfloat => 4..=LARGEST,
@@ -133,19 +135,19 @@ impl Shape {
         let widths = if products == Products::Shader { SHADER..=SHADER } else { COLUMNS..=LARGEST };
         let mut best = Self { width: 32, height: 16, kernel: Kernel::Paths, error: EXACT_ROUNDING };
         let mut least = f64::INFINITY;
-        for (kernel, noise) in products.kernels(seen, error) {
+        for (kernel, noise) in products.kernels(lighting, error) {
             let rows = if kernel == Kernel::Bfloat { 16 } else { 4 };
             let shapes = widths.clone().step_by(COLUMNS).flat_map(|width| {
                 let heights = heights.clone().filter(|height| height.is_multiple_of(rows));
                 heights.map(move |height| [width, height])
             });
             for [width, height] in shapes {
-                let bound = separable_error(optics, seen.distance, seen.tilt, width, height) + noise;
+                let bound = separable_error(optics, lighting.distance, lighting.tilt, width, height) + noise;
                 let shape = Self { width, height, kernel, error: bound };
                 // A span that is not on tile borders touches one tile more; one that fills the panel does not.
                 let tiles = [0, 1].map(|axis| {
-                    let (panel, size) = (seen.panel[axis], [width, height][axis]);
-                    let cone = 2.0 * seen.distance * seen.sine[axis] / optics.pitch[axis];
+                    let (panel, size) = (lighting.panel[axis], [width, height][axis]);
+                    let cone = 2.0 * lighting.distance * lighting.sine[axis] / optics.pitch[axis];
                     (panel.div_ceil(size) as f64).min(cone / size as f64 + 1.0)
                 });
                 let work = tiles[0] * tiles[1] * shape.seconds();
@@ -171,10 +173,10 @@ impl Shape {
 
 /// Rounding of integer products (relative L2): that of the columns' factors goes with the batch's largest wave, of the
 /// rows' with the wave itself, and neighbouring roundings are independent.
-fn integer_noise(seen: &Seen) -> f64 {
+fn integer_noise(lighting: &Lighting) -> f64 {
     // The contrast is that on the axis; aslant a wave is weaker by the cosine.
-    let cosine = (1.0 - seen.sine.map(|sine| sine * sine).iter().sum::<f64>()).max(0.01).sqrt();
-    INTEGER_NOISE * OVERSHOOT * (seen.contrast / cosine).hypot(1.0)
+    let cosine = (1.0 - lighting.sine.map(|sine| sine * sine).iter().sum::<f64>()).max(0.01).sqrt();
+    INTEGER_NOISE * OVERSHOOT * (lighting.contrast / cosine).hypot(1.0)
 }
 
 /// Rounding of the f32 path of the exact kernel: half a unit in the last place of up to 16 turns [rad].
@@ -203,8 +205,8 @@ mod tests {
     use super::*;
     use crate::field::Grid;
 
-    const HD: Seen =
-        Seen { panel: [1920, 1080], distance: 0.2, sine: [0.04; 2], tilt: 0.04 * 0.04 / 3.0, contrast: 1.5 };
+    const HD: Lighting =
+        Lighting { panel: [1920, 1080], distance: 0.2, sine: [0.04; 2], tilt: 0.04 * 0.04 / 3.0, contrast: 1.5 };
 
     fn hd() -> Optics {
         Optics::new(&Grid::new(1920, 1080, 8e-6, 8e-6).expect("grid"), 632.8e-9).expect("optics")
@@ -214,7 +216,7 @@ mod tests {
     fn tiles_grow_with_the_allowed_error_and_shrink_with_angle_and_nearness() {
         let optics = hd();
         let area = |distance: f64, error: f64| {
-            let shape = Shape::choose(&optics, &Seen { distance, ..HD }, Products::Float, error);
+            let shape = Shape::choose(&optics, &Lighting { distance, ..HD }, Products::Float, error);
             assert!(shape.error <= error || shape.kernel == Kernel::Paths);
             if shape.kernel == Kernel::Paths { 1 } else { shape.width * shape.height }
         };
@@ -225,14 +227,14 @@ mod tests {
         assert!((bound * 9.0 / 0.005 - 1.0).abs() < 0.1, "{bound}");
         let fine = Grid::new(64, 64, 1e-6, 1e-6).expect("grid");
         let wide = Optics::new(&fine, 632.8e-9).expect("optics");
-        let seen = Seen { panel: [64, 64], distance: 5e-3, sine: [0.32; 2], tilt: 0.03, contrast: 1.0 };
-        assert_eq!(Shape::choose(&wide, &seen, Products::Float, 1e-4).kernel, Kernel::Paths);
+        let lighting = Lighting { panel: [64, 64], distance: 5e-3, sine: [0.32; 2], tilt: 0.03, contrast: 1.0 };
+        assert_eq!(Shape::choose(&wide, &lighting, Products::Float, 1e-4).kernel, Kernel::Paths);
     }
 
     #[test]
     fn integers_are_taken_where_their_rounding_is_a_small_part_of_the_error() {
         let of = |products: Products, contrast: f64, error: f64| {
-            Shape::choose(&hd(), &Seen { contrast, ..HD }, products, error)
+            Shape::choose(&hd(), &Lighting { contrast, ..HD }, products, error)
         };
         assert_eq!(of(Products::Integer, 1.5, 2e-3).kernel, Kernel::Integer);
         assert_eq!(of(Products::Float, 1.5, 2e-3).kernel, Kernel::Float);
@@ -243,7 +245,7 @@ mod tests {
         }
         // Their rounding is stated: a tile of the same size promises less.
         let [integer, float] = [Products::Integer, Products::Float].map(|products| of(products, 3.0, 2e-3));
-        assert!(integer.error > integer_noise(&Seen { contrast: 3.0, ..HD }) && integer.error <= 2e-3);
+        assert!(integer.error > integer_noise(&Lighting { contrast: 3.0, ..HD }) && integer.error <= 2e-3);
         assert!(integer.width * integer.height < float.width * float.height);
         // bfloat16 where its rounding leaves room, whatever the contrast, in whole blocks of rows.
         for contrast in [1.5, 20.0] {

@@ -1,14 +1,15 @@
 //! Products in integers and in bfloat16: against f32 on one tile, and against the oracle as fields.
 
 use super::batch::BATCH;
-use super::kernel::{COLUMNS, ROWS};
-use super::shape::{BFLOAT_NOISE, INTEGER_NOISE, OVERSHOOT};
+use super::kernel::ROWS;
+use super::shape::{BFLOAT_NOISE, COLUMNS, INTEGER_NOISE, OVERSHOOT};
 use super::*;
-use crate::field::{Complex64, relative_error};
+use crate::field::{Complex64, Grid, relative_error};
 use crate::hologram::lanes::Portable;
 use crate::hologram::lanes::matrix::{Plain, SIDE};
 use crate::hologram::{HologramSettings, Method, compute, oracle, plan};
 use crate::points::PointSource;
+use crate::progress::Progress;
 use crate::random::Random;
 use glam::DVec3;
 
