@@ -38,17 +38,15 @@ impl Grid {
     /// A centred grid; refuses an empty one and a pitch that is not positive and finite.
     pub fn new(width: usize, height: usize, pitch_x: f64, pitch_y: f64) -> Result<Self> {
         if width == 0 || height == 0 {
-            return Err(Error::parameter("size", format!("{width}×{height} has no pixels")));
+            return Err(Error::out_of_range("size", format_args!("{width}×{height}"), "has no pixels"));
         }
         // 2³² samples are 34 GB of complex64: larger fields are streamed as tiles, never held.
         if width.checked_mul(height).is_none_or(|n| n > 1 << 32) {
-            return Err(Error::parameter("size", format!("{width}×{height} is too large for one field")));
+            let size = format_args!("{width}×{height}");
+            return Err(Error::out_of_range("size", size, "is too large for one field"));
         }
-        for pitch in [pitch_x, pitch_y] {
-            if !(pitch.is_finite() && pitch > 0.0) {
-                return Err(Error::parameter("pitch", format!("{pitch} m must be greater than zero and finite")));
-            }
-        }
+        positive("pitch", pitch_x)?;
+        positive("pitch", pitch_y)?;
         Ok(Self { width, height, pitch_x, pitch_y, center: [0.0; 2] })
     }
     /// The same lattice about another middle [m].
@@ -129,6 +127,22 @@ impl Grid {
 /// Offset of sample `index` of `count` from their middle [m]; both may be of any integer type.
 pub fn offset(index: f64, count: f64, pitch: f64) -> f64 {
     (index - (count - 1.0) * 0.5) * pitch
+}
+
+/// Refuses a length [m] that is not positive and finite.
+pub(crate) fn positive(name: &'static str, length: f64) -> Result<()> {
+    if length.is_finite() && length > 0.0 {
+        return Ok(());
+    }
+    Err(Error::out_of_range(name, format_args!("{length} m"), "must be greater than zero and finite"))
+}
+
+/// Refuses a distance [m] that is not finite.
+pub(crate) fn finite(name: &'static str, distance: f64) -> Result<()> {
+    if distance.is_finite() {
+        return Ok(());
+    }
+    Err(Error::out_of_range(name, format_args!("{distance} m"), "is not finite"))
 }
 
 /// Spatial frequency of `cycles` over `count` samples [cycles/m].

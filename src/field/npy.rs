@@ -4,7 +4,7 @@
 //! ([`FieldMetadata`]); a field without it is read when the caller says pitch and wavelength.
 
 use crate::error::{Error, Result};
-use crate::field::{Complex32, Complex64, Field, Grid};
+use crate::field::{Complex32, Complex64, Field, Grid, grid};
 use crate::files;
 use npyz::{NpyFile, Order, WriterBuilder};
 use serde::{Deserialize, Serialize};
@@ -174,16 +174,12 @@ pub fn read_field(path: &Path, pitch: Option<[f64; 2]>, wavelength: Option<f64>)
     let array = read_complex(path)?;
     let beside = read_metadata(path)?;
     let missing = |what: &str| {
-        Error::input(
-            path,
-            format!("its {what} is not known: no {} beside it; give --{what}", metadata_path(path).display()),
-        )
+        let beside = metadata_path(path);
+        Error::input(path, format!("its {what} is not known: no {} beside it; give the {what}", beside.display()))
     };
     let wavelength = wavelength.or(beside.as_ref().map(|m| m.wavelength)).ok_or_else(|| missing("wavelength"))?;
     let pitch = pitch.or(beside.as_ref().map(|m| m.pitch)).ok_or_else(|| missing("pitch"))?;
-    if !(wavelength.is_finite() && wavelength > 0.0) {
-        return Err(Error::input(path, format!("wavelength {wavelength} m must be greater than zero")));
-    }
+    grid::positive("wavelength", wavelength).map_err(|e| Error::input(path, e.to_string()))?;
     let center = beside.as_ref().map_or([0.0; 2], |m| m.center);
     let grid = Grid::new(array.width, array.height, pitch[0], pitch[1])?.centered_at(center);
     let content = beside.as_ref().map_or_else(Content::default, |m| m.content);
@@ -236,7 +232,7 @@ mod tests {
         assert_eq!(metadata.content, content);
         std::fs::remove_file(metadata_path(&path)).expect("remove");
         let refused = read_field(&path, Some([8e-6, 9e-6]), None).unwrap_err().to_string();
-        assert!(refused.contains("--wavelength"), "{refused}");
+        assert!(refused.contains("give the wavelength"), "{refused}");
     }
 
     #[test]

@@ -34,8 +34,8 @@
 //! integral: below 150·(pitch/r)², and λ/r where the small cross term is left out (which makes T·T separable). Both hold for
 //! q ≲ 1.7. Inside the flat part the field is the bare sphere to 1e-7. Nearer, the integral itself is summed.
 
-use crate::error::{Error, Result};
-use crate::field::{Complex64, Grid};
+use crate::error::Result;
+use crate::field::{Complex64, Grid, grid};
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
@@ -88,11 +88,8 @@ pub struct Optics {
 impl Optics {
     /// The definition's constants for a grid; refuses a wavelength that is not positive and finite.
     pub fn new(grid: &Grid, wavelength: f64) -> Result<Self> {
-        if !(wavelength.is_finite() && wavelength > 0.0) {
-            let what = format!("{wavelength} m must be greater than zero and finite");
-            return Err(Error::parameter("wavelength", what));
-        }
-        let pitch = [grid.pitch_x, grid.pitch_y];
+        grid::positive("wavelength", wavelength)?;
+        let pitch = grid.pitch();
         Ok(Self { wavelength, taper: pitch.map(|p| Taper::new(p, wavelength)), pitch })
     }
     /// 1/q of the far form at the coarser axis: the Fresnel number of the taper's edge, π λ r s².

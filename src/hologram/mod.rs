@@ -240,7 +240,7 @@ pub fn compute_progressively(
     mut show: impl FnMut(&Field, f32),
 ) -> Result<Computed> {
     if !(1..=8).contains(&passes) {
-        return Err(Error::parameter("passes", format!("{passes}: one to eight")));
+        return Err(Error::out_of_range("passes", passes, "must be one to eight"));
     }
     let step = |pass: u32| 4usize.pow(passes - 1 - pass);
     let mut whole: Option<Computed> = None;

@@ -60,7 +60,7 @@ pub(super) enum Engine {
     },
 }
 
-/// One way to do the job.
+/// One way to do the request.
 struct Candidate {
     method: Method,
     engine: Engine,
@@ -70,15 +70,15 @@ struct Candidate {
     words: String,
 }
 
-/// The job, as the candidates see it.
-struct Job<'a> {
+/// What is asked for, as the candidates see it.
+struct Request<'a> {
     sum: PointSum<'a>,
     settings: &'a HologramSettings,
     /// What is left of the budget beside the sources [bytes].
     memory: u64,
 }
 
-impl Job<'_> {
+impl Request<'_> {
     /// The sources as planes take them.
     fn cloud(&self) -> Cloud<'_> {
         Cloud::new(self.sum.optics, self.sum.grid, self.sum.sources)
@@ -231,7 +231,7 @@ pub fn plan(points: &[PointSource], grid: &Grid, wavelength: f64, settings: &Hol
     let optics = Optics::new(grid, wavelength)?;
     let error = settings.error;
     if !(1e-5..1.0).contains(&error) {
-        return Err(Error::parameter("error", format!("{error:e} must lie between 1e-5 and 1")));
+        return Err(Error::out_of_range("error", format_args!("{error:e}"), "must lie between 1e-5 and 1"));
     }
     let set = settings.instruction_set.unwrap_or_else(InstructionSet::detect);
     if !InstructionSet::available().contains(&set) {
@@ -242,23 +242,23 @@ pub fn plan(points: &[PointSource], grid: &Grid, wavelength: f64, settings: &Hol
     let sum = PointSum { optics, grid, sources: &sources, cull: settings.cull, progress };
     let pairs = Coverage::of(points.len(), &sum).pairs;
     let own = (size_of::<Source>() * sources.len()) as u64;
-    let job = Job { sum, settings, memory: settings.memory.saturating_sub(own) };
+    let request = Request { sum, settings, memory: settings.memory.saturating_sub(own) };
     let threads = rayon::current_num_threads() as f64;
     let (mut best, reason) = match settings.method {
         Some(method) => {
             let candidate = match method {
-                Method::Oracle => job.oracle(pairs),
-                Method::Direct => job.exact(method, DIRECT_ERROR),
-                Method::Tiles => job.exact(method, error),
-                Method::Planes => job.planes().ok_or_else(|| refuse_planes(settings))?,
-                Method::Gpu => job.gpu(error, pairs, threads)?,
-                Method::GpuPlanes => job.gpu_planes(threads)?,
-                Method::Recurrence => job.recurrence(error, pairs),
+                Method::Oracle => request.oracle(pairs),
+                Method::Direct => request.exact(method, DIRECT_ERROR),
+                Method::Tiles => request.exact(method, error),
+                Method::Planes => request.planes().ok_or_else(|| refuse_planes(settings))?,
+                Method::Gpu => request.gpu(error, pairs, threads)?,
+                Method::GpuPlanes => request.gpu_planes(threads)?,
+                Method::Recurrence => request.recurrence(error, pairs),
             };
             let reason = format!("{} as asked for", candidate.words);
             (candidate, reason)
         }
-        None => choose(&job, error, pairs, threads)?,
+        None => choose(&request, error, pairs, threads)?,
     };
     // The points as the engines take them.
     best.memory += own;
@@ -288,23 +288,23 @@ fn refuse_planes(settings: &HologramSettings) -> Error {
 }
 
 /// The fastest that keeps error and memory, and why.
-fn choose(job: &Job, error: f64, pairs: f64, threads: f64) -> Result<(Candidate, String)> {
-    let mut candidates: Vec<Candidate> = job.planes().into_iter().collect();
+fn choose(request: &Request, error: f64, pairs: f64, threads: f64) -> Result<(Candidate, String)> {
+    let mut candidates: Vec<Candidate> = request.planes().into_iter().collect();
     // Dividing the points among tiles takes as long as many a field: not where the sum cannot be quicker.
-    let set = job.settings.instruction_set.unwrap_or_else(InstructionSet::detect);
+    let set = request.settings.instruction_set.unwrap_or_else(InstructionSet::detect);
     let sum = pairs * Products::of(set).least_pair();
-    let beaten = candidates.iter().any(|c| c.core_seconds < sum && c.memory <= job.memory && c.error <= error);
+    let beaten = candidates.iter().any(|c| c.core_seconds < sum && c.memory <= request.memory && c.error <= error);
     if !beaten {
-        candidates.push(job.exact(Method::Direct, DIRECT_ERROR));
+        candidates.push(request.exact(Method::Direct, DIRECT_ERROR));
         if error > DIRECT_ERROR {
-            candidates.push(job.exact(Method::Tiles, error));
+            candidates.push(request.exact(Method::Tiles, error));
         }
     }
     // Opening a graphics processor takes a quarter of a second: only for jobs that are worth it.
     let quickest = candidates.iter().map(|c| c.core_seconds / threads).fold(f64::INFINITY, f64::min);
     if quickest > GPU_WORTH && has_hardware_gpu() {
-        candidates.extend(job.gpu(error, pairs, threads).ok());
-        candidates.extend(job.gpu_planes(threads).ok());
+        candidates.extend(request.gpu(error, pairs, threads).ok());
+        candidates.extend(request.gpu_planes(threads).ok());
     }
     candidates.sort_by(|a, b| a.core_seconds.total_cmp(&b.core_seconds));
     let mut others: Vec<String> =
@@ -312,13 +312,13 @@ fn choose(job: &Job, error: f64, pairs: f64, threads: f64) -> Result<(Candidate,
     if beaten {
         others.push(format!("sums over {sum:.2e} core-seconds"));
     }
-    let fits = |c: &Candidate| c.memory <= job.memory && (c.error <= error || c.method == Method::Direct);
+    let fits = |c: &Candidate| c.memory <= request.memory && (c.error <= error || c.method == Method::Direct);
     let Some(best) = candidates.iter().position(fits) else {
         let least = candidates.iter().min_by_key(|c| c.memory);
-        let beside = job.settings.memory - job.memory;
+        let beside = request.settings.memory - request.memory;
         let needed = least.map_or(0, |c| (c.memory + beside).div_ceil(1 << 20));
         let hint = "give more memory, a smaller panel or fewer points".to_owned();
-        return Err(Error::Memory { what: "hologram", needed, budget: job.settings.memory >> 20, hint });
+        return Err(Error::Memory { what: "hologram", needed, budget: request.settings.memory >> 20, hint });
     };
     let best = candidates.swap_remove(best);
     let reason = format!("{}; least of {} within an error of {error:.0e}", best.words, others.join(", "));

@@ -73,7 +73,7 @@ pub(crate) fn add(field: &mut Field, sum: &PointSum, class: &Class, block: usize
     let axes = [Axis::new(optics, 0, limit), Axis::new(optics, 1, limit)];
     let tangent = class.tangent(optics, limit);
     let members = class.members(sum.sources);
-    let job = Job { axes: &axes, wavenumber: 1.0 / optics.wavelength, limit, block };
+    let rows = RowBlock { axes: &axes, wavenumber: 1.0 / optics.wavelength, limit, block };
     let across = grid.width.div_ceil(block);
     let tiles: Vec<usize> = (0..blocks(grid, block)).collect();
     let half = [0.5 * block as f64 * grid.pitch_x, 0.5 * ROWS as f64 * grid.pitch_y];
@@ -94,11 +94,11 @@ pub(crate) fn add(field: &mut Field, sum: &PointSum, class: &Class, block: usize
                     let (dx, dy) = (center[0] - s.x, center[1] - s.y);
                     let lit = |d: f64, axis: usize| d.abs() - half[axis] <= tangent[axis] * s.distance;
                     if lit(dx, 0) && lit(dy, 1) {
-                        let point = BlockWave::new(&job, s, dx, dy);
-                        let (job, sums, line) = (&job, &mut sums, &mut line);
+                        let point = BlockWave::new(&rows, s, dx, dy);
+                        let (rows, sums, line) = (&rows, &mut sums, &mut line);
                         // SAFETY: the set was detected; buffers have block·16 and 2·(block + 16) values.
                         unsafe {
-                            dispatch!(set, carry(job: &Job, point: BlockWave, sums: &mut [Aligned; 2], line: &mut Aligned));
+                            dispatch!(set, carry(rows: &RowBlock, point: BlockWave, sums: &mut [Aligned; 2], line: &mut Aligned));
                         }
                     }
                 }
@@ -122,7 +122,7 @@ pub(crate) fn add(field: &mut Field, sum: &PointSum, class: &Class, block: usize
     Ok(())
 }
 
-struct Job<'a> {
+struct RowBlock<'a> {
     axes: &'a [Axis; 2],
     wavenumber: f64,
     limit: Limit<'a>,
@@ -147,9 +147,9 @@ struct BlockWave {
 }
 
 impl BlockWave {
-    fn new(job: &Job, s: &Source, dx: f64, dy: f64) -> Self {
-        let r = (dx * dx + dy * dy + s.distance * s.distance).sqrt().max(0.1 / job.wavenumber);
-        let turns = s.sign * r * job.wavenumber;
+    fn new(rows: &RowBlock, s: &Source, dx: f64, dy: f64) -> Self {
+        let r = (dx * dx + dy * dy + s.distance * s.distance).sqrt().max(0.1 / rows.wavenumber);
+        let turns = s.sign * r * rows.wavenumber;
         let phase = turns + s.turns;
         Self {
             sine: [dx / r, dy / r],
@@ -169,14 +169,14 @@ impl BlockWave {
 /// # Safety
 /// As [`Lanes`].
 #[inline(always)]
-unsafe fn edge<L: Lanes>(job: &Job, point: &BlockWave, axis: usize, u: L) -> (L, L) {
-    let a = &job.axes[axis];
+unsafe fn edge<L: Lanes>(rows: &RowBlock, point: &BlockWave, axis: usize, u: L) -> (L, L) {
+    let a = &rows.axes[axis];
     let s = point.sine[axis];
     let step = a.pitch * point.inverse;
     // SAFETY: the caller's promise; a level has its eight runs of sixteen.
     unsafe {
         let one = L::splat(1.0);
-        match job.limit {
+        match rows.limit {
             Limit::None => (one, L::splat(0.0)),
             Limit::Hard => {
                 let position = u.fma(L::splat(a.pitch as f32), L::splat(point.offset[axis] as f32));
@@ -198,12 +198,12 @@ unsafe fn edge<L: Lanes>(job: &Job, point: &BlockWave, axis: usize, u: L) -> (L,
 }
 
 /// Whether the taper is flat over a whole block.
-fn flat(job: &Job, point: &BlockWave) -> bool {
-    let a = &job.axes[0];
-    let reach = (point.sine[0].abs() + 0.5 * job.block as f64 * a.pitch * point.inverse) * a.scale + a.offset;
-    match job.limit {
+fn flat(rows: &RowBlock, point: &BlockWave) -> bool {
+    let a = &rows.axes[0];
+    let reach = (point.sine[0].abs() + 0.5 * rows.block as f64 * a.pitch * point.inverse) * a.scale + a.offset;
+    match rows.limit {
         Limit::None => true,
-        Limit::Hard => point.offset[0].abs() + 0.5 * job.block as f64 * a.pitch <= point.distance * a.tangent,
+        Limit::Hard => point.offset[0].abs() + 0.5 * rows.block as f64 * a.pitch <= point.distance * a.tangent,
         Limit::Soft(_) => reach <= 0.0,
     }
 }
@@ -213,21 +213,21 @@ fn flat(job: &Job, point: &BlockWave) -> bool {
 /// # Safety
 /// The instruction set of `L` must be enabled; `sums` have block × 16 values, `line` 2·(block + 16).
 #[inline(always)]
-unsafe fn carry<L: Lanes>(job: &Job, point: BlockWave, sums: &mut [Aligned; 2], line: &mut Aligned) {
-    let block = job.block;
+unsafe fn carry<L: Lanes>(rows: &RowBlock, point: BlockWave, sums: &mut [Aligned; 2], line: &mut Aligned) {
+    let block = rows.block;
     let lanes: [f32; 16] = std::array::from_fn(|i| i as f32);
     let half = 0.5 * (block as f64 - 1.0);
     let [re, im] = sums;
     let (re, im, line) = (re.values_mut(), im.values_mut(), line.values_mut());
     assert!(re.len() >= block * ROWS && im.len() >= block * ROWS && line.len() >= 2 * (block + 16));
-    let bright = flat(job, &point);
+    let bright = flat(rows, &point);
     // SAFETY: lengths were checked; a vector never passes its row of sixteen or the line's last sixteen.
     unsafe {
         let lane = L::load(lanes.as_ptr());
         if !bright {
             let mut u = 0;
             while u < block {
-                let (a, b) = edge::<L>(job, &point, 0, lane.add(L::splat((u as f64 - half) as f32)));
+                let (a, b) = edge::<L>(rows, &point, 0, lane.add(L::splat((u as f64 - half) as f32)));
                 a.store(line.as_mut_ptr().add(u));
                 b.store(line.as_mut_ptr().add(block + 16 + u));
                 u += L::COUNT;
@@ -238,16 +238,16 @@ unsafe fn carry<L: Lanes>(job: &Job, point: BlockWave, sums: &mut [Aligned; 2], 
             let one = L::splat(1.0);
             let v = lane.add(L::splat(row as f32 - 0.5 * (ROWS as f32 - 1.0)));
             // ρ = r(v)/r = √(1 + δ).
-            let e = v.mul(L::splat((job.axes[1].pitch * point.inverse) as f32));
+            let e = v.mul(L::splat((rows.axes[1].pitch * point.inverse) as f32));
             let delta = e.mul(e.add(L::splat(2.0 * point.sine[1] as f32)));
             let rho = one.add(delta).max(L::splat(1e-6)).sqrt();
             let inverse = one.div(rho);
             let base = delta.mul(L::splat(point.turns)).div(one.add(rho)).add(L::splat(point.base));
             let sine = L::splat(point.sine[0] as f32).mul(inverse);
-            let scale = point.sign * (job.axes[0].pitch * job.wavenumber) as f32;
+            let scale = point.sign * (rows.axes[0].pitch * rows.wavenumber) as f32;
             let first = sine.mul(L::splat(scale));
             let bend = sine.fnma(sine, one);
-            let second = bend.mul(inverse).mul(L::splat(0.5 * scale * (job.axes[0].pitch * point.inverse) as f32));
+            let second = bend.mul(inverse).mul(L::splat(0.5 * scale * (rows.axes[0].pitch * point.inverse) as f32));
             let start = L::splat(-half as f32);
             let (c, s) = cos_sin(second.fma(start, first).fma(start, base));
             let (qc, qs) = cos_sin(second.fma(L::splat((1.0 - 2.0 * half) as f32), first));
@@ -260,7 +260,7 @@ unsafe fn carry<L: Lanes>(job: &Job, point: BlockWave, sums: &mut [Aligned; 2], 
             let fall = square.fma(L::splat(1.0 / 24.0), L::splat(-0.5)).mul(square);
             let rise = square.fma(L::splat(1.0 / 120.0), L::splat(-1.0 / 6.0)).fma(square, one).mul(angle);
             let amplitude = L::splat(point.amplitude).mul(inverse);
-            let (yr, yi) = edge::<L>(job, &point, 1, v);
+            let (yr, yi) = edge::<L>(rows, &point, 1, v);
             let (yr, yi) = (yr.mul(amplitude), yi.mul(amplitude));
             let mut z = (s.fnma(yi, c.mul(yr)), s.fma(yr, c.mul(yi)));
             let times = |a: (L, L), b: (L, L)| (a.1.fnma(b.1, a.0.mul(b.0)), a.1.fma(b.0, a.0.mul(b.1)));

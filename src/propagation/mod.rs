@@ -9,6 +9,23 @@
 //! The padding is input + output size, so that nothing wraps round. The phase 2πf_z·d is reduced to one turn in f64.
 //!
 //! [`Propagator`] goes between windows of one pitch, anywhere beside each other; [`ScaledPropagator`] onto any pitch.
+//!
+//! ```
+//! use holodrive::field::{Complex32, Field, Grid, relative_error};
+//! use holodrive::progress::Progress;
+//! use holodrive::propagation::propagate;
+//!
+//! // A beam of 0.3 mm waist spreads over 0.1 m, keeps its energy, and comes back as it was.
+//! let grid = Grid::new(256, 256, 8e-6, 8e-6)?;
+//! let beam = |i: usize| (-(grid.x(i % 256).powi(2) + grid.y(i / 256).powi(2)) / 0.3e-3f64.powi(2)).exp();
+//! let samples = (0..grid.len()).map(|i| Complex32::new(beam(i) as f32, 0.0)).collect();
+//! let waist = Field::new(grid, 532e-9, samples)?;
+//! let far = propagate(&waist, 0.1, &Progress::new())?;
+//! assert!((far.energy() / waist.energy() - 1.0).abs() < 1e-4);
+//! let back = propagate(&far, -0.1, &Progress::new())?;
+//! assert!(relative_error(&back.samples, &waist.samples) < 1e-3);
+//! # Ok::<(), holodrive::Error>(())
+//! ```
 
 pub mod oracle;
 mod scaled;
@@ -16,7 +33,7 @@ mod scaled;
 pub use scaled::{ScaledPropagator, propagate_scaled};
 
 use crate::error::{Error, Result};
-use crate::field::{Complex, Fft2, FftNum, Field, Grid};
+use crate::field::{Complex, Fft2, FftNum, Field, Grid, grid};
 use crate::names::{Name, Named};
 use crate::progress::Progress;
 use serde::{Deserialize, Serialize};
@@ -53,6 +70,18 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self { kernel: Kernel::AngularSpectrum, band_limit: true, memory: 8 << 30 }
+    }
+}
+
+impl Settings {
+    /// Refuses what takes more memory [bytes] than it may.
+    fn allow(&self, needed: u64) -> Result<()> {
+        if needed <= self.memory {
+            return Ok(());
+        }
+        let hint = "propagate to a smaller window".to_owned();
+        let (needed, budget) = (needed.div_ceil(1 << 20), self.memory >> 20);
+        Err(Error::Memory { what: "propagation", needed, budget, hint })
     }
 }
 
@@ -105,20 +134,13 @@ impl<T: FftNum> Propagator<T> {
         }
         let (width, height) = (input.width + output.width, input.height + output.height);
         let padded = Grid::new(width, height, input.pitch_x, input.pitch_y)?;
-        // The padded field and the transform's turned copy of it.
-        let needed = 2 * padded.len() as u64 * size_of::<Complex<T>>() as u64;
-        if needed > settings.memory {
-            return Err(Error::Memory {
-                what: "propagation",
-                needed: needed >> 20,
-                budget: settings.memory >> 20,
-                hint: "propagate to a smaller window".into(),
-            });
-        }
-        Ok(Self { input, output, padded, settings, transform: Fft2::new(width, height) })
+        let planned = Self { input, output, padded, settings, transform: Fft2::new(width, height) };
+        settings.allow(planned.memory())?;
+        Ok(planned)
     }
 
-    /// Memory that [`Propagator::propagate`] takes besides input and output [bytes].
+    /// Memory that [`Propagator::propagate`] takes besides input and output [bytes]: the padded field and the transform's
+    /// turned copy of it.
     pub fn memory(&self) -> u64 {
         2 * self.padded.len() as u64 * size_of::<Complex<T>>() as u64
     }
@@ -137,9 +159,7 @@ impl<T: FftNum> Propagator<T> {
         progress: &Progress,
     ) -> Result<Field<T>> {
         assert_eq!(field.grid, self.input, "the field stands on the planned grid");
-        if !distance.is_finite() {
-            return Err(Error::parameter("distance", format!("{distance} m is not finite")));
-        }
+        grid::finite("distance", distance)?;
         progress.check()?;
         let wavelength = field.wavelength;
         let zero = Complex::new(T::zero(), T::zero());

@@ -19,7 +19,7 @@
 //! further out, and the period n·p_in is that much longer, so that nothing wraps round: what is left out is below 1e-6.
 
 use super::{Aperture, Settings, turned, turns_and_decay};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::field::{Complex, Fft1, FftNum, Field, Grid, fast_length, grid};
 use crate::progress::Progress;
 use rayon::prelude::*;
@@ -56,12 +56,8 @@ impl<T: FftNum> ScaledPropagator<T> {
     /// [`Error::Parameter`] for a wavelength that is not positive, or a distance that is not finite; [`Error::Memory`]
     /// when the spectra pass the budget.
     pub fn new(input: Grid, output: Grid, wavelength: f64, distance: f64, settings: Settings) -> Result<Self> {
-        if !(wavelength.is_finite() && wavelength > 0.0) {
-            return Err(Error::parameter("wavelength", format!("{wavelength} m must be greater than zero and finite")));
-        }
-        if !distance.is_finite() {
-            return Err(Error::parameter("distance", format!("{distance} m is not finite")));
-        }
+        grid::positive("wavelength", wavelength)?;
+        grid::finite("distance", distance)?;
         let guard = if settings.band_limit { GUARD * (wavelength * distance.abs()).sqrt() } else { 0.0 };
         let counts =
             [(input.width, output.extent_x(), input.pitch_x), (input.height, output.extent_y(), input.pitch_y)].map(
@@ -71,15 +67,7 @@ impl<T: FftNum> ScaledPropagator<T> {
                 },
             );
         let planned = Self { input, output, wavelength, distance, settings, counts, lines: counts.map(Fft1::new) };
-        let needed = planned.memory();
-        if needed > settings.memory {
-            return Err(Error::Memory {
-                what: "propagation",
-                needed: needed.div_ceil(1 << 20),
-                budget: settings.memory >> 20,
-                hint: "propagate to a smaller window".into(),
-            });
-        }
+        settings.allow(planned.memory())?;
         Ok(planned)
     }
 

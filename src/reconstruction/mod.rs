@@ -19,7 +19,7 @@ pub use orders::{Orders, orders};
 pub use picture::{Picture, Scale, read_gray, write_coded_png, write_rgb_png};
 
 use crate::error::{Error, Result};
-use crate::field::{Field, Grid};
+use crate::field::{Field, Grid, grid};
 use crate::progress::Progress;
 use crate::propagation::{Aperture, Propagator, Settings};
 use glam::DVec2;
@@ -140,12 +140,10 @@ fn at_pupil(
     progress: &Progress,
 ) -> Result<Field> {
     if !(position.iter().all(|c| c.is_finite()) && position[2] > 0.0) {
-        let what = format!("the eye at z = {} m must stand in front of the panel", position[2]);
-        return Err(Error::parameter("eye", what));
+        let place = format_args!("z = {} m", position[2]);
+        return Err(Error::out_of_range("eye", place, "must stand in front of the panel"));
     }
-    if !(pupil.is_finite() && pupil > 0.0) {
-        return Err(Error::parameter("pupil", format!("{pupil} m must be greater than zero")));
-    }
+    grid::positive("pupil", pupil)?;
     let grid = window(&field.grid, DVec2::splat(0.5 * pupil))?.centered_at([position[0], position[1]]);
     let mut cut = Propagator::new(field.grid, grid, settings.propagation)?.propagate_through(
         field,
@@ -168,7 +166,8 @@ fn window(field: &Grid, half: DVec2) -> Result<Grid> {
     let (width, height) = (side(half.x, field.pitch_x), side(half.y, field.pitch_y));
     // 2²⁰ samples a side are metres of plane: a window beyond is a slip in a unit.
     if !(width >= 1.0 && height >= 1.0 && width <= (1 << 20) as f64 && height <= (1 << 20) as f64) {
-        return Err(Error::parameter("window", format!("half size {} × {} m cannot be sampled", half.x, half.y)));
+        let size = format_args!("half size {} × {} m", half.x, half.y);
+        return Err(Error::out_of_range("window", size, "cannot be sampled"));
     }
     Grid::new(width as usize, height as usize, field.pitch_x, field.pitch_y)
 }
@@ -215,9 +214,7 @@ pub fn all_in_focus(
     if !(near.is_finite() && far.is_finite()) {
         return Err(Error::parameter("depths", "no pixel has a depth"));
     }
-    if step.is_nan() || step <= 0.0 {
-        return Err(Error::parameter("step", format!("{step} m must be greater than zero")));
-    }
+    grid::positive("step", step)?;
     let planes = ((near - far) / step).ceil().max(1.0) as usize;
     let thickness = (near - far) / planes as f64;
     let plane_of = |depth: Option<f64>| {

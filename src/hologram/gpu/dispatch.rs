@@ -1,8 +1,8 @@
 //! Dispatches of the GPU engine: prepared cells in, a band of the field out.
 
 use super::device::Device;
-use super::record::{Readback, group, storage, uniform};
-use super::{Band, CELL, Job, Point, Set, WAVE};
+use super::record::{Readback, Recorder, group, storage, uniform};
+use super::{Band, CELL, Constants, Point, Set, WAVE};
 use crate::error::Result;
 use crate::progress::Progress;
 use pixels::wgpu;
@@ -24,7 +24,7 @@ const CELLS: usize = 65_535;
 /// Buffers of one computation, and how much a dispatch may take.
 pub(super) struct Engine<'a> {
     device: &'a Device,
-    job: wgpu::Buffer,
+    constants: wgpu::Buffer,
     points: wgpu::Buffer,
     cells: wgpu::Buffer,
     band: wgpu::Buffer,
@@ -36,7 +36,7 @@ impl<'a> Engine<'a> {
     pub(super) fn new(device: &'a Device, pixels: usize) -> Self {
         Self {
             device,
-            job: uniform(device, "job", &[0; size_of::<Job>()]),
+            constants: uniform(device, "constants", &[0; size_of::<Constants>()]),
             points: storage(device, "points", (CHUNK * size_of::<Point>()) as u64),
             cells: storage(device, "cells", CELLS as u64 * 16),
             band: storage(device, "band", 8 * pixels as u64),
@@ -46,10 +46,10 @@ impl<'a> Engine<'a> {
 
     /// Adds a set to the band: cells are prepared on the CPU while those before are summed.
     pub(super) fn sum(&mut self, band: &Band, set: &Set, progress: &Progress) -> Result<()> {
-        let job = Job { width: band.grid.width as u32, height: band.rows as u32, ..set.job };
-        self.device.queue.write_buffer(&self.job, 0, bytemuck::bytes_of(&job));
+        let constants = Constants { width: band.grid.width as u32, height: band.rows as u32, ..set.constants };
+        self.device.queue.write_buffer(&self.constants, 0, bytemuck::bytes_of(&constants));
         let pipeline = &self.device.pipelines[set.pipeline];
-        let bound = [&self.job, &self.points, &self.cells, &set.edges, &self.band];
+        let bound = [&self.constants, &self.points, &self.cells, &set.edges, &self.band];
         let group = group(self.device, pipeline, &bound);
         let size = size_of::<Point>() * set.members.len().max(1);
         let together = (WAVE as usize / size).max(1);
@@ -112,20 +112,14 @@ impl<'a> Engine<'a> {
         cells: &[[u32; 4]],
         progress: &Progress,
     ) -> Result<()> {
-        progress.check()?;
         let start = Instant::now();
         let queue = &self.device.queue;
         queue.write_buffer(&self.points, 0, bytemuck::cast_slice(points));
         queue.write_buffer(&self.cells, 0, bytemuck::cast_slice(cells));
-        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, group, &[]);
-            pass.dispatch_workgroups(TILES, cells.len() as u32, 1);
-        }
-        let submission = queue.submit([encoder.finish()]);
-        self.device.wait(Some(submission))?;
+        let mut recorder = Recorder::new(self.device, progress);
+        recorder.dispatch(pipeline, group, [TILES, cells.len() as u32])?;
+        let submission = recorder.submit()?;
+        self.device.wait(submission)?;
         let spent = start.elapsed();
         if spent < DISPATCH / 2 {
             self.pairs *= 2.0;

@@ -60,7 +60,7 @@ struct Point {
 /// Constants of a dispatch, as the shader takes them.
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-struct Job {
+struct Constants {
     pitch: [f32; 2],
     scale: [f32; 2],
     offset: [f32; 2],
@@ -209,7 +209,7 @@ struct Set {
     pipeline: usize,
     edges: wgpu::Buffer,
     /// Constants, but for the band's size.
-    job: Job,
+    constants: Constants,
 }
 
 impl Set {
@@ -218,7 +218,7 @@ impl Set {
         let table = class.edges(sum);
         let limit = Limit::new(cull, &table);
         let axes = [0, 1].map(|axis| Axis::new(optics, axis, limit));
-        let job = Job {
+        let constants = Constants {
             pitch: axes.map(|axis| axis.pitch as f32),
             scale: axes.map(|axis| axis.scale as f32),
             offset: axes.map(|axis| axis.offset as f32),
@@ -245,7 +245,7 @@ impl Set {
             tangent: class.tangent(optics, limit),
             pipeline: usize::from(class.shape.kernel == Kernel::Paths),
             edges,
-            job,
+            constants,
         }
     }
 }

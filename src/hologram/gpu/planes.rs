@@ -18,7 +18,7 @@ use crate::error::{Error, Result};
 use crate::field::{Field, Grid};
 use crate::hologram::definition::Optics;
 use crate::hologram::dispersion::{Dispersion, reduced};
-use crate::hologram::planes::{Cloud, Dab, Layout, Parameters, Slabs, Table, carrier, dab, layout_of, mean_square};
+use crate::hologram::planes::{Cloud, Layout, Parameters, Slabs, Splat, Table, carrier, layout_of, mean_square, splat};
 use crate::hologram::sources::Source;
 use crate::progress::Progress;
 use pixels::wgpu;
@@ -79,7 +79,7 @@ pub(crate) fn cost(cloud: &Cloud, parameters: &Parameters) -> Result<Cost> {
     }
     let count = cloud.sources.len();
     let chunk = count.min(STROKES);
-    let own = size_of::<Source>() + size_of::<Dab>() + size_of::<[[u32; 2]; 2]>();
+    let own = size_of::<Source>() + size_of::<Splat>() + size_of::<[[u32; 2]; 2]>();
     // Strokes and lists stand on the host, wait there to be copied, and on the device; tables on both sides.
     let host = count * own + 2 * (chunk * size_of::<Stroke>() + 4 * ENTRIES) + 8 * grid.len();
     let on_device = (parameters.rank as u64 + 2) * 8 * samples + (STROKES * size_of::<Stroke>() + 4 * ENTRIES) as u64;
@@ -362,9 +362,9 @@ pub(crate) fn field(cloud: &Cloud, parameters: &Parameters, progress: &Progress)
     for k in 0..slabs.depths.len() {
         let middle = slabs.plane(k);
         let is_here = |s: &&Source| slabs.index(s.sign * s.distance) == k;
-        let to_dab = |s: &Source| dab(cloud, &layout, carrier, s, middle);
-        let dabs: Vec<Dab> = sources.par_iter().filter(is_here).map(to_dab).collect();
-        let spans: Vec<_> = dabs.par_iter().map(|dab| span(dab, slope, parameters.tail, tiles)).collect();
+        let to_splat = |s: &Source| splat(cloud, &layout, carrier, s, middle);
+        let splats: Vec<Splat> = sources.par_iter().filter(is_here).map(to_splat).collect();
+        let spans: Vec<_> = splats.par_iter().map(|splat| span(splat, slope, parameters.tail, tiles)).collect();
         // What is written waits in memory until the device has done what came before it.
         if let Some(submission) = before.take() {
             device.wait(Some(submission))?;
@@ -374,7 +374,8 @@ pub(crate) fn field(cloud: &Cloud, parameters: &Parameters, progress: &Progress)
             if part > 0 {
                 device.wait(None)?;
             }
-            let strokes: Vec<Stroke> = dabs[chunk.clone()].par_iter().map(|dab| Stroke::new(dab, tables, h)).collect();
+            let strokes: Vec<Stroke> =
+                splats[chunk.clone()].par_iter().map(|splat| Stroke::new(splat, tables, h)).collect();
             let lists = Lists::new(&spans[chunk], tiles, WORK[usize::from(device.software)]);
             engine.paint(&mut recorder, &strokes, &lists)?;
             progress.advance(strokes.len() as u64);

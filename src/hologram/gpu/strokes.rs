@@ -1,6 +1,6 @@
 //! Points as the shader paints them, and the lists of those that touch each tile.
 
-use crate::hologram::planes::{Dab, Layout, Table};
+use crate::hologram::planes::{Layout, Splat, Table};
 
 /// Side of a tile [px]; as in the shader.
 const TILE: usize = 64;
@@ -29,16 +29,16 @@ pub(super) struct Stroke {
 
 impl Stroke {
     /// `half` is the slabs' half depth [m].
-    pub(super) fn new(dab: &Dab, tables: [&Table; 2], half: f64) -> Self {
-        let [x, y] = [0, 1].map(|axis| tables[axis].place(dab.d, dab.at[axis]));
+    pub(super) fn new(splat: &Splat, tables: [&Table; 2], half: f64) -> Self {
+        let [x, y] = [0, 1].map(|axis| tables[axis].place(splat.d, splat.at[axis]));
         Self {
             pixel: [x.pixel as i32, y.pixel as i32],
             line: [x.line as u32, y.line as u32],
             depth: [x.u, y.u],
             part: [x.t, y.t],
-            factor: dab.factor,
-            sign: if dab.d < 0.0 { -1.0 } else { 1.0 },
-            ratio: (dab.d / half) as f32,
+            factor: splat.factor,
+            sign: if splat.d < 0.0 { -1.0 } else { 1.0 },
+            ratio: (splat.d / half) as f32,
         }
     }
 }
@@ -48,14 +48,14 @@ pub(super) fn tiles(layout: &Layout) -> [usize; 2] {
     [layout.size[0].div_ceil(TILE), layout.painted.div_ceil(TILE)]
 }
 
-/// Columns and rows of tiles that a dab's kernel touches.
-pub(super) fn span(dab: &Dab, slope: [f64; 2], tail: f64, tiles: [usize; 2]) -> [[u32; 2]; 2] {
+/// Columns and rows of tiles that a splat's kernel touches.
+pub(super) fn span(splat: &Splat, slope: [f64; 2], tail: f64, tiles: [usize; 2]) -> [[u32; 2]; 2] {
     [0, 1].map(|axis| {
-        let reach = dab.d.abs() * slope[axis] + tail;
+        let reach = splat.d.abs() * slope[axis] + tail;
         // Saturating: what lies before the first tile belongs to it.
         let last = tiles[axis] - 1;
         let tile = |pixel: f64| ((pixel as usize) / TILE).min(last) as u32;
-        [tile(dab.at[axis] - reach), tile(dab.at[axis] + reach + 1.0)]
+        [tile(splat.at[axis] - reach), tile(splat.at[axis] + reach + 1.0)]
     })
 }
 

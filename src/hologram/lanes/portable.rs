@@ -11,6 +11,20 @@ fn each(f: impl Fn(usize) -> f32) -> Portable {
     Portable(std::array::from_fn(f))
 }
 
+/// Functions of vectors, given as functions of one lane.
+macro_rules! lane_by_lane {
+    ($($name:ident($x:ident $(, $operand:ident)*) = $value:expr;)*) => {$(
+        #[inline(always)]
+        unsafe fn $name(self $(, $operand: Self)*) -> Self {
+            each(|i| {
+                let $x = self.0[i];
+                $(let $operand = $operand.0[i];)*
+                $value
+            })
+        }
+    )*};
+}
+
 // SAFETY: needs no instruction set; pointers are the caller's promise.
 unsafe impl Lanes for Portable {
     const COUNT: usize = 8;
@@ -29,41 +43,16 @@ unsafe impl Lanes for Portable {
         // SAFETY: eight writable values, as promised.
         unsafe { to.cast::<[f32; 8]>().write_unaligned(self.0) }
     }
-    #[inline(always)]
-    unsafe fn add(self, b: Self) -> Self {
-        each(|i| self.0[i] + b.0[i])
-    }
-    #[inline(always)]
-    unsafe fn sub(self, b: Self) -> Self {
-        each(|i| self.0[i] - b.0[i])
-    }
-    #[inline(always)]
-    unsafe fn mul(self, b: Self) -> Self {
-        each(|i| self.0[i] * b.0[i])
-    }
-    #[inline(always)]
-    unsafe fn div(self, b: Self) -> Self {
-        each(|i| self.0[i] / b.0[i])
-    }
-    #[inline(always)]
-    unsafe fn sqrt(self) -> Self {
-        each(|i| self.0[i].sqrt())
-    }
-    #[inline(always)]
-    unsafe fn min(self, b: Self) -> Self {
-        each(|i| if self.0[i] < b.0[i] { self.0[i] } else { b.0[i] })
-    }
-    #[inline(always)]
-    unsafe fn max(self, b: Self) -> Self {
-        each(|i| if self.0[i] > b.0[i] { self.0[i] } else { b.0[i] })
-    }
-    #[inline(always)]
-    unsafe fn fma(self, b: Self, c: Self) -> Self {
-        each(|i| self.0[i] * b.0[i] + c.0[i])
-    }
-    #[inline(always)]
-    unsafe fn fnma(self, b: Self, c: Self) -> Self {
-        each(|i| c.0[i] - self.0[i] * b.0[i])
+    lane_by_lane! {
+        add(x, b) = x + b;
+        sub(x, b) = x - b;
+        mul(x, b) = x * b;
+        div(x, b) = x / b;
+        sqrt(x) = x.sqrt();
+        min(x, b) = if x < b { x } else { b };
+        max(x, b) = if x > b { x } else { b };
+        fma(x, b, c) = x * b + c;
+        fnma(x, b, c) = c - x * b;
     }
     #[inline(always)]
     unsafe fn turn(self) -> Self {

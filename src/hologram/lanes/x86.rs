@@ -11,6 +11,17 @@ pub(crate) struct Avx512(pub(crate) __m512);
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(__m256);
 
+/// Functions of vectors that are one intrinsic each.
+macro_rules! single_instructions {
+    ($($name:ident($($operand:ident),*) = $intrinsic:ident;)*) => {$(
+        #[inline(always)]
+        unsafe fn $name(self $(, $operand: Self)*) -> Self {
+            // SAFETY: the caller is where the set is present.
+            unsafe { Self($intrinsic(self.0 $(, $operand.0)*)) }
+        }
+    )*};
+}
+
 // SAFETY: each function needs the set named in the type; pointers are the caller's promise.
 unsafe impl Lanes for Avx512 {
     const COUNT: usize = 16;
@@ -30,50 +41,16 @@ unsafe impl Lanes for Avx512 {
         // SAFETY: writable as promised.
         unsafe { _mm512_storeu_ps(to, self.0) }
     }
-    #[inline(always)]
-    unsafe fn add(self, b: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm512_add_ps(self.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn sub(self, b: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm512_sub_ps(self.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn mul(self, b: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm512_mul_ps(self.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn div(self, b: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm512_div_ps(self.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn min(self, b: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm512_min_ps(self.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn max(self, b: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm512_max_ps(self.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn sqrt(self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm512_sqrt_ps(self.0)) }
-    }
-    #[inline(always)]
-    unsafe fn fma(self, b: Self, c: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm512_fmadd_ps(self.0, b.0, c.0)) }
-    }
-    #[inline(always)]
-    unsafe fn fnma(self, b: Self, c: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm512_fnmadd_ps(self.0, b.0, c.0)) }
+    single_instructions! {
+        add(b) = _mm512_add_ps;
+        sub(b) = _mm512_sub_ps;
+        mul(b) = _mm512_mul_ps;
+        div(b) = _mm512_div_ps;
+        min(b) = _mm512_min_ps;
+        max(b) = _mm512_max_ps;
+        sqrt() = _mm512_sqrt_ps;
+        fma(b, c) = _mm512_fmadd_ps;
+        fnma(b, c) = _mm512_fnmadd_ps;
     }
     #[inline(always)]
     unsafe fn turn(self) -> Self {
@@ -141,50 +118,16 @@ unsafe impl Lanes for Avx2 {
         // SAFETY: writable as promised.
         unsafe { _mm256_storeu_ps(to, self.0) }
     }
-    #[inline(always)]
-    unsafe fn add(self, b: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm256_add_ps(self.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn sub(self, b: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm256_sub_ps(self.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn mul(self, b: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm256_mul_ps(self.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn div(self, b: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm256_div_ps(self.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn min(self, b: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm256_min_ps(self.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn max(self, b: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm256_max_ps(self.0, b.0)) }
-    }
-    #[inline(always)]
-    unsafe fn sqrt(self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm256_sqrt_ps(self.0)) }
-    }
-    #[inline(always)]
-    unsafe fn fma(self, b: Self, c: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm256_fmadd_ps(self.0, b.0, c.0)) }
-    }
-    #[inline(always)]
-    unsafe fn fnma(self, b: Self, c: Self) -> Self {
-        // SAFETY: the caller is where the set is present.
-        unsafe { Self(_mm256_fnmadd_ps(self.0, b.0, c.0)) }
+    single_instructions! {
+        add(b) = _mm256_add_ps;
+        sub(b) = _mm256_sub_ps;
+        mul(b) = _mm256_mul_ps;
+        div(b) = _mm256_div_ps;
+        min(b) = _mm256_min_ps;
+        max(b) = _mm256_max_ps;
+        sqrt() = _mm256_sqrt_ps;
+        fma(b, c) = _mm256_fmadd_ps;
+        fnma(b, c) = _mm256_fnmadd_ps;
     }
     #[inline(always)]
     unsafe fn turn(self) -> Self {

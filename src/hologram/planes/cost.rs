@@ -7,7 +7,7 @@ use super::layout;
 use super::paint::{self, GROUP};
 use super::spectrum::Spectrum;
 use super::table::Table;
-use super::{Cloud, Dab, Parameters, Slabs};
+use super::{Cloud, Parameters, Slabs, Splat};
 use crate::hologram::sources::Source;
 
 /// A pixel's part in a column: its factors once a plane, its transform and the sum once a moment [core-seconds].
@@ -109,7 +109,7 @@ impl Parameters {
         let half = [0, 1].map(|axis| Table::half_width(cloud.optics, axis, slabs.half, self.tail));
         let tables: u64 = self.table_bytes(cloud.optics, slabs.half).iter().sum();
         let points =
-            cloud.sources.len() as u64 * (size_of::<Source>() + size_of::<Dab>() + paint::ORDER_BYTES + 8) as u64;
+            cloud.sources.len() as u64 * (size_of::<Source>() + size_of::<Splat>() + paint::ORDER_BYTES + 8) as u64;
         plane + Spectrum::bytes(&layout, self.rank) + paint::bytes(half, self.rank) + tables + points
     }
 }

@@ -30,7 +30,7 @@ use spectrum::Spectrum;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-pub(in crate::hologram) use paint::Dab;
+pub(in crate::hologram) use paint::Splat;
 pub(in crate::hologram) use slabs::Slabs;
 pub(in crate::hologram) use spectrum::Layout;
 pub(in crate::hologram) use table::{Fineness, Table, mean_square};
@@ -255,14 +255,14 @@ pub(in crate::hologram) fn carrier(optics: &Optics, tables: [&Table; 2]) -> f64 
 }
 
 /// A source relative to the plane at the signed distance `middle` [m].
-pub(in crate::hologram) fn dab(cloud: &Cloud, layout: &Layout, carrier: f64, s: &Source, middle: f64) -> Dab {
+pub(in crate::hologram) fn splat(cloud: &Cloud, layout: &Layout, carrier: f64, s: &Source, middle: f64) -> Splat {
     let (optics, grid) = (cloud.optics, cloud.grid);
     let d = s.sign * s.distance - middle;
     let turns = d * carrier + s.turns + 0.25 * s.sign;
     let (sin, cos) = ((turns - turns.round()) * std::f64::consts::TAU).sin_cos();
     let a = s.amplitude * optics.wavelength;
     let at = [grid.column(s.x) - layout.origin[0] as f64, grid.row(s.y) - layout.origin[1] as f64];
-    Dab { at, d, factor: [(a * cos) as f32, (a * sin) as f32] }
+    Splat { at, d, factor: [(a * cos) as f32, (a * sin) as f32] }
 }
 
 /// The cloud's field on the panel.
@@ -289,8 +289,8 @@ pub(crate) fn field(cloud: &Cloud, parameters: &Parameters, set: InstructionSet,
     let mut patches = Patches::default();
     for (k, members) in slabs.members(sources, |s| s.sign * s.distance).iter().enumerate() {
         let middle = slabs.plane(k);
-        let one = |&i: &u32| dab(cloud, &layout, carrier, &sources[i as usize], middle);
-        let dabs: Vec<Dab> = members.par_iter().map(one).collect();
+        let one = |&i: &u32| splat(cloud, &layout, carrier, &sources[i as usize], middle);
+        let splats: Vec<Splat> = members.par_iter().map(one).collect();
         for moment in &mut moments {
             moment.par_chunks_mut(1 << 16).for_each(|part| {
                 if !progress.stopped() {
@@ -299,7 +299,7 @@ pub(crate) fn field(cloud: &Cloud, parameters: &Parameters, set: InstructionSet,
             });
         }
         let mut canvas = Canvas { width: layout.size[0], moments: &mut moments };
-        paint(&mut canvas, &brush, &dabs, &mut patches, set, progress)?;
+        paint(&mut canvas, &brush, &splats, &mut patches, set, progress)?;
         spectrum.add(middle, &mut moments, progress)?;
     }
     spectrum.finish(grid, progress)

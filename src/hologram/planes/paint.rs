@@ -14,7 +14,7 @@ use rayon::prelude::*;
 /// Points painted together: a patch's row is loaded and stored once for all of them.
 pub(super) const GROUP: usize = 3;
 
-/// Cells of dabs that are painted one after another [px].
+/// Cells of splats that are painted one after another [px].
 pub(super) const CELL: usize = 16;
 
 /// Side of a bin for kernels of the given half sizes [px]: a patch is the bin and the kernels' reach around it, and what
@@ -26,7 +26,7 @@ pub(super) fn bin(half: [usize; 2], rank: usize) -> usize {
     if patch(128) > CACHE && patch(64) <= CACHE { 64 } else { 128 }
 }
 
-/// Most dabs of one patch: a crowded bin is shared among threads, and f32 sums of more terms lose digits.
+/// Most splats of one patch: a crowded bin is shared among threads, and f32 sums of more terms lose digits.
 const LARGEST: usize = 4096;
 
 /// Patches that are painted before they are added: few, so that they stay in a cache, but some for every thread. The
@@ -40,7 +40,7 @@ const BAND: usize = 16;
 
 /// A point relative to its plane.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::hologram) struct Dab {
+pub(in crate::hologram) struct Splat {
     /// Fractional column and row on the plane.
     pub(in crate::hologram) at: [f64; 2],
     /// Signed depth from the plane [m].
@@ -49,7 +49,7 @@ pub(in crate::hologram) struct Dab {
     pub(in crate::hologram) factor: [f32; 2],
 }
 
-/// What all dabs share.
+/// What all splats share.
 #[derive(Debug)]
 pub(super) struct Brush<'a> {
     /// Kernels along x and y.
@@ -58,7 +58,7 @@ pub(super) struct Brush<'a> {
     pub(super) slope: [f64; 2],
     /// Pixels painted beyond the cone.
     pub(super) tail: f64,
-    /// Number of moments: plane r takes the dab times (d/h)^r.
+    /// Number of moments: plane r takes the splat times (d/h)^r.
     pub(super) rank: usize,
     /// Largest |d|, h [m].
     pub(super) depth: f64,
@@ -86,7 +86,7 @@ struct Patch {
     im: Aligned,
 }
 
-/// Memory for sorting, of one dab [bytes].
+/// Memory for sorting, of one splat [bytes].
 pub(super) const ORDER_BYTES: usize = size_of::<(u64, u32, u32)>() + size_of::<u32>();
 
 /// Memory of one wave of patches, for kernels of the given half sizes [px], and of the threads that paint [bytes].
@@ -97,21 +97,21 @@ pub(super) fn bytes(half: [usize; 2], rank: usize) -> u64 {
     (wave() * (width + 16) * height * 8 * rank + rayon::current_num_threads() * lines) as u64
 }
 
-/// Paints dabs, which must lie on the canvas with their whole kernels.
+/// Paints splats, which must lie on the canvas with their whole kernels.
 pub(super) fn paint(
     canvas: &mut Canvas,
     brush: &Brush,
-    dabs: &[Dab],
+    splats: &[Splat],
     Patches(patches): &mut Patches,
     set: InstructionSet,
     progress: &Progress,
 ) -> Result<()> {
-    let bins = bins(dabs, canvas.width, brush.bin);
+    let bins = bins(splats, canvas.width, brush.bin);
     patches.resize_with(patches.len().max(wave().min(bins.len())), Patch::default);
     for wave in bins.chunks(wave()) {
         patches.par_iter_mut().zip(wave).for_each(|(patch, bin)| {
             if !progress.stopped() {
-                paint_bin(patch, brush, dabs, bin, set, progress);
+                paint_bin(patch, brush, splats, bin, set, progress);
             }
         });
         progress.check()?;
@@ -133,14 +133,14 @@ pub(super) fn paint(
     Ok(())
 }
 
-/// Indexes of the dabs of each bin that has any, bins in row-major order, within a bin near ones beside each other; a
+/// Indexes of the splats of each bin that has any, bins in row-major order, within a bin near ones beside each other; a
 /// crowded bin comes in several parts.
-fn bins(dabs: &[Dab], width: usize, bin: usize) -> Vec<Vec<u32>> {
+fn bins(splats: &[Splat], width: usize, bin: usize) -> Vec<Vec<u32>> {
     let across = width.div_ceil(bin) as u64;
     let side = bin as u64;
     let cells = side / CELL as u64;
-    let key = |dab: &Dab| {
-        let [x, y] = dab.at.map(|p| p as u64);
+    let key = |splat: &Splat| {
+        let [x, y] = splat.at.map(|p| p as u64);
         let bin = (y / side) * across + x / side;
         // Cells in boustrophedon order: a group's kernels are of similar size and place, so little of their union is
         // wasted.
@@ -148,8 +148,8 @@ fn bins(dabs: &[Dab], width: usize, bin: usize) -> Vec<Vec<u32>> {
         (bin * cells + cy) * cells + if cy % 2 == 0 { cx } else { cells - 1 - cx }
     };
     // Positive floats are in the order of their bits; equal ones keep their order by the index.
-    let entry = |(i, dab): (usize, &Dab)| (key(dab), (dab.d.abs() as f32).to_bits(), i as u32);
-    let mut order: Vec<(u64, u32, u32)> = dabs.par_iter().enumerate().map(entry).collect();
+    let entry = |(i, splat): (usize, &Splat)| (key(splat), (splat.d.abs() as f32).to_bits(), i as u32);
+    let mut order: Vec<(u64, u32, u32)> = splats.par_iter().enumerate().map(entry).collect();
     order.par_sort_unstable();
     order
         .chunk_by(|a, b| a.0 / (cells * cells) == b.0 / (cells * cells))
@@ -158,19 +158,26 @@ fn bins(dabs: &[Dab], width: usize, bin: usize) -> Vec<Vec<u32>> {
         .collect()
 }
 
-/// Half size of a dab's kernel [px].
+/// Half size of a splat's kernel [px].
 fn reach(brush: &Brush, axis: usize, d: f64) -> f64 {
     d.abs() * brush.slope[axis] + brush.tail
 }
 
-fn paint_bin(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32], set: InstructionSet, progress: &Progress) {
+fn paint_bin(
+    patch: &mut Patch,
+    brush: &Brush,
+    splats: &[Splat],
+    bin: &[u32],
+    set: InstructionSet,
+    progress: &Progress,
+) {
     let mut span = [[usize::MAX, 0]; 2];
     for &i in bin {
-        let dab = &dabs[i as usize];
+        let splat = &splats[i as usize];
         for (axis, span) in span.iter_mut().enumerate() {
-            let reach = reach(brush, axis, dab.d);
-            let first = (dab.at[axis] - reach).max(0.0) as usize;
-            let last = (dab.at[axis] + reach) as usize + 2;
+            let reach = reach(brush, axis, splat.d);
+            let first = (splat.at[axis] - reach).max(0.0) as usize;
+            let last = (splat.at[axis] + reach) as usize + 2;
             *span = [span[0].min(first), span[1].max(last)];
         }
     }
@@ -184,16 +191,16 @@ fn paint_bin(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32], set: I
     }
     // SAFETY: the set was detected on this machine.
     unsafe {
-        dispatch!(set, paint_groups(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32], progress: &Progress));
+        dispatch!(set, paint_groups(patch: &mut Patch, brush: &Brush, splats: &[Splat], bin: &[u32], progress: &Progress));
     }
 }
 
 /// # Safety
 /// The instruction set of `L` must be enabled.
 #[inline(always)]
-unsafe fn paint_groups<L: Lanes>(patch: &mut Patch, brush: &Brush, dabs: &[Dab], bin: &[u32], progress: &Progress) {
+unsafe fn paint_groups<L: Lanes>(patch: &mut Patch, brush: &Brush, splats: &[Splat], bin: &[u32], progress: &Progress) {
     let (width, height) = (patch.width, patch.height);
-    // Kernels of a group: x as re and im of `width`, y as re and im of one dab, then (re, im) of all dabs by row.
+    // Kernels of a group: x as re and im of `width`, y as re and im of one splat, then (re, im) of all splats by row.
     let tall = height.next_multiple_of(16) + 16;
     let mut lines = Aligned::default();
     lines.reserve(GROUP * 2 * (width + 16) + 2 * tall + GROUP * 2 * tall);
@@ -206,11 +213,11 @@ unsafe fn paint_groups<L: Lanes>(patch: &mut Patch, brush: &Brush, dabs: &[Dab],
         }
         let (mut span_x, mut span_y) = ([usize::MAX, 0], [usize::MAX, 0]);
         for &i in group {
-            let dab = &dabs[i as usize];
+            let splat = &splats[i as usize];
             for (axis, span) in [(0, &mut span_x), (1, &mut span_y)] {
-                let reach = reach(brush, axis, dab.d);
-                let first = ((dab.at[axis] - reach).max(0.0) as usize).saturating_sub(patch.first[axis]);
-                let last = (dab.at[axis] + reach) as usize + 2 - patch.first[axis];
+                let reach = reach(brush, axis, splat.d);
+                let first = ((splat.at[axis] - reach).max(0.0) as usize).saturating_sub(patch.first[axis]);
+                let last = (splat.at[axis] + reach) as usize + 2 - patch.first[axis];
                 *span = [span[0].min(first), span[1].max(last)];
             }
         }
@@ -225,15 +232,15 @@ unsafe fn paint_groups<L: Lanes>(patch: &mut Patch, brush: &Brush, dabs: &[Dab],
         // SAFETY: `columns` ≤ width and `rows` rounded up ≤ tall fit their lines; spans lie inside the patch.
         unsafe {
             for (n, &i) in group.iter().enumerate() {
-                let dab = &dabs[i as usize];
+                let splat = &splats[i as usize];
                 let x = xs.as_mut_ptr().add(n * 2 * columns);
                 let start = (patch.first[0] + first) as isize;
-                brush.tables[0].write::<L>(dab.d, dab.at[0], start, columns, x, x.add(columns));
+                brush.tables[0].write::<L>(splat.d, splat.at[0], start, columns, x, x.add(columns));
                 let start = (patch.first[1] + span_y[0]) as isize;
                 let y = line.as_mut_ptr();
                 let padded = rows.next_multiple_of(L::COUNT);
-                brush.tables[1].write::<L>(dab.d, dab.at[1], start, padded, y, y.add(tall));
-                let [a, b] = dab.factor;
+                brush.tables[1].write::<L>(splat.d, splat.at[1], start, padded, y, y.add(tall));
+                let [a, b] = splat.factor;
                 for row in 0..rows {
                     let (re, im) = (line[row], line[tall + row]);
                     ys[(row * GROUP + n) * 2] = re * a - im * b;
@@ -243,7 +250,7 @@ unsafe fn paint_groups<L: Lanes>(patch: &mut Patch, brush: &Brush, dabs: &[Dab],
             for r in 0..brush.rank {
                 if r > 0 {
                     let scale: [f32; GROUP] = std::array::from_fn(|n| {
-                        group.get(n).map_or(0.0, |&i| (dabs[i as usize].d / brush.depth) as f32)
+                        group.get(n).map_or(0.0, |&i| (splats[i as usize].d / brush.depth) as f32)
                     });
                     for y in ys[..rows * GROUP * 2].chunks_exact_mut(GROUP * 2) {
                         for n in 0..GROUP {

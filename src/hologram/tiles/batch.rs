@@ -1,6 +1,6 @@
 //! The set-up of a batch of points on a tile, in whole vectors of f64: what kernels of factors start from.
 
-use super::factor::{Factor, Job, Limit, Relative, factor};
+use super::factor::{Factor, Limit, Relative, Tile, factor};
 use super::shape::OVERSHOOT;
 
 /// Points of a batch: X of 32 columns and one block of Y stay in a first-level cache of 32 KB.
@@ -25,7 +25,7 @@ pub(super) struct Batch {
 impl Batch {
     /// As [`factor`], in whole vectors.
     #[inline(always)]
-    pub(super) fn new(job: &Job, points: &[Relative], half: [f64; 2]) -> Self {
+    pub(super) fn new(tile: &Tile, points: &[Relative], half: [f64; 2]) -> Self {
         let dark = Relative { distance: 1.0, sign: 1.0, ..Relative::default() };
         let of = |value: fn(&Relative) -> f64| -> [f64; BATCH] {
             let mut values = [value(&dark); BATCH];
@@ -48,13 +48,13 @@ impl Batch {
             let r = (dx * dx + dy * dy + distance[k] * distance[k]).sqrt();
             batch.inverse[k] = 1.0 / r;
             batch.amplitude[k] = own[k] / r;
-            let phase = sign[k] * r * job.wavenumber + turns[k];
+            let phase = sign[k] * r * tile.wavenumber + turns[k];
             base[k] = phase - phase.floor();
             batch.turns[k] = base[k] as f32;
         }
         for axis in 0..2 {
-            let constants = &job.axes[axis];
-            let (tapered, cut) = match job.limit {
+            let constants = &tile.axes[axis];
+            let (tapered, cut) = match tile.limit {
                 Limit::None => (0.0, 0.0),
                 Limit::Hard => (0.0, 1.0),
                 Limit::Soft(_) => (1.0, 0.0),
@@ -63,7 +63,7 @@ impl Batch {
                 let step = constants.pitch * batch.inverse[k];
                 let s = offsets[axis][k] * batch.inverse[k];
                 let bend = 1.0 - s * s;
-                let scale = sign[k] * constants.pitch * job.wavenumber;
+                let scale = sign[k] * constants.pitch * tile.wavenumber;
                 let second = 0.5 * scale * bend * step;
                 // Whole turns an index are none; they leave whole halves of a turn at the centre.
                 let whole = (scale * s).round_ties_even();
@@ -96,7 +96,7 @@ impl Batch {
     #[inline(always)]
     pub(super) fn factor<'a>(
         &self,
-        job: &Job<'a>,
+        tile: &Tile<'a>,
         points: &[Relative],
         k: usize,
         axis: usize,
@@ -105,7 +105,7 @@ impl Batch {
         let amplitude = if axis == 0 { self.amplitude[k] } else { 1.0 } as f32;
         match points.get(k) {
             Some(point) if self.edge[axis][k] > 0.0 => {
-                let mut found = self.tapered(job, point, k, axis, half);
+                let mut found = self.tapered(tile, point, k, axis, half);
                 found.amplitude = amplitude;
                 found
             }
@@ -117,9 +117,9 @@ impl Batch {
     }
     /// The factor of a point that the taper or the cut touches, term by term.
     #[inline(always)]
-    pub(super) fn tapered<'a>(&self, job: &Job<'a>, p: &Relative, k: usize, axis: usize, half: f64) -> Factor<'a> {
+    pub(super) fn tapered<'a>(&self, tile: &Tile<'a>, p: &Relative, k: usize, axis: usize, half: f64) -> Factor<'a> {
         let offset = if axis == 0 { p.dx } else { p.dy };
-        let mut found = factor(job, &job.axes[axis], p, offset, self.inverse[k], half);
+        let mut found = factor(tile, &tile.axes[axis], p, offset, self.inverse[k], half);
         found.base = if axis == 0 { self.turns[k] } else { 0.0 };
         found
     }

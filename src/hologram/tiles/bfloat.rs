@@ -6,7 +6,7 @@
 //! sums are f32.
 
 use super::batch::{BATCH, Batch};
-use super::factor::{Factor, Job, Relative, evaluate};
+use super::factor::{Factor, Relative, Tile, evaluate};
 use super::kernel::{LONG_BATCH, Panels};
 use super::shape::COLUMNS;
 use crate::hologram::lanes::Avx512;
@@ -16,28 +16,28 @@ use std::arch::x86_64::*;
 /// Adds a batch of points to the tile in `panels`.
 ///
 /// # Safety
-/// The processor has the features below and the unit. `panels` has been cleared for the job's size and this kernel; width
+/// The processor has the features below and the unit. `panels` has been cleared for the tile's size and this kernel; width
 /// is a multiple of [`COLUMNS`], height of [`SIDE`]; at most [`LONG_BATCH`] points.
 #[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl,avx2,fma")]
-pub(super) unsafe fn add_batch<U: Unit>(job: &Job, points: &[Relative], panels: &mut Panels) {
-    assert!(points.len() <= LONG_BATCH && job.width.is_multiple_of(COLUMNS) && job.height.is_multiple_of(SIDE));
-    let half = [0.5 * (job.width as f64 - 1.0), 0.5 * (job.height as f64 - 1.0)];
+pub(super) unsafe fn add_batch<U: Unit>(tile: &Tile, points: &[Relative], panels: &mut Panels) {
+    assert!(points.len() <= LONG_BATCH && tile.width.is_multiple_of(COLUMNS) && tile.height.is_multiple_of(SIDE));
+    let half = [0.5 * (tile.width as f64 - 1.0), 0.5 * (tile.height as f64 - 1.0)];
     let count = points.len().div_ceil(SIDE);
     let (x, y) = (panels.x.values_mut(), panels.y.values_mut());
-    assert!(x.len() >= LONG_BATCH * job.width && y.len() >= 2 * LONG_BATCH * job.height);
+    assert!(x.len() >= LONG_BATCH * tile.width && y.len() >= 2 * LONG_BATCH * tile.height);
     let (x, y) = (x.as_mut_ptr().cast::<u32>(), y.as_mut_ptr().cast::<u32>());
     for (part, points) in points.chunks(BATCH).enumerate() {
-        let batch = Batch::new(job, points, half);
+        let batch = Batch::new(tile, points, half);
         for sixteen in 0..points.len().div_ceil(SIDE) {
             let block = part * BATCH / SIDE + sixteen;
             let factors = |axis: usize| -> [Factor; SIDE] {
-                std::array::from_fn(|i| batch.factor(job, points, sixteen * SIDE + i, axis, half[axis]))
+                std::array::from_fn(|i| batch.factor(tile, points, sixteen * SIDE + i, axis, half[axis]))
             };
             // SAFETY: count blocks of sixteen points for each vector of columns, twice for each of rows, as asserted.
             unsafe {
                 for (point, factor) in factors(0).iter().enumerate() {
                     let mut at = start(half[0]);
-                    for vector in 0..job.width / SIDE {
+                    for vector in 0..tile.width / SIDE {
                         let place = ((vector / 2 * count + block) * 2 + vector % 2) * BLOCK + point * SIDE;
                         let (re, im) = evaluate(factor, Avx512(at));
                         _mm512_store_epi32(x.add(place).cast(), pairs(re.0, im.0));
@@ -46,7 +46,7 @@ pub(super) unsafe fn add_batch<U: Unit>(job: &Job, points: &[Relative], panels: 
                 }
                 let factors = factors(1);
                 let mut at = start(half[1]);
-                for vector in 0..job.height / SIDE {
+                for vector in 0..tile.height / SIDE {
                     let mut lines = [_mm512_setzero_si512(); SIDE];
                     for (line, factor) in lines.iter_mut().zip(&factors) {
                         let (re, im) = evaluate(factor, Avx512(at));
@@ -65,15 +65,15 @@ pub(super) unsafe fn add_batch<U: Unit>(job: &Job, points: &[Relative], panels: 
         }
     }
     let (re, im) = (panels.re.values_mut(), panels.im.values_mut());
-    assert!(re.len() >= job.width * job.height && im.len() >= job.width * job.height);
+    assert!(re.len() >= tile.width * tile.height && im.len() >= tile.width * tile.height);
     // SAFETY: the unit is present; blocks lie inside the tile, all their factors were filled above.
     unsafe {
         U::begin();
-        for column in 0..job.width / COLUMNS {
-            for row in 0..job.height / SIDE {
-                let at = row * SIDE * job.width + column * COLUMNS;
+        for column in 0..tile.width / COLUMNS {
+            for row in 0..tile.height / SIDE {
+                let at = row * SIDE * tile.width + column * COLUMNS;
                 let (x, y) = (x.add(column * count * 2 * BLOCK), y.add(row * count * 2 * BLOCK));
-                U::product(count, y, x, re.as_mut_ptr().add(at), im.as_mut_ptr().add(at), job.width);
+                U::product(count, y, x, re.as_mut_ptr().add(at), im.as_mut_ptr().add(at), tile.width);
             }
         }
         U::end();

@@ -25,7 +25,7 @@ pub(super) struct Relative {
 
 /// One tile's size and what its points have in common.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Job<'a> {
+pub(super) struct Tile<'a> {
     pub(super) width: usize,
     pub(super) height: usize,
     pub(super) axes: &'a [Axis; 2],
@@ -127,14 +127,21 @@ impl Factor<'_> {
 /// Third-order expansion of the sphere along an axis: `offset` = Δ on it at the tile's centre, `half` its half size in
 /// indexes, `inverse` = 1/r.
 #[inline(always)]
-pub(super) fn factor<'a>(job: &Job<'a>, axis: &Axis, p: &Relative, offset: f64, inverse: f64, half: f64) -> Factor<'a> {
+pub(super) fn factor<'a>(
+    tile: &Tile<'a>,
+    axis: &Axis,
+    p: &Relative,
+    offset: f64,
+    inverse: f64,
+    half: f64,
+) -> Factor<'a> {
     let step = axis.pitch * inverse;
     let s = offset * inverse;
     let bend = 1.0 - s * s;
-    let scale = p.sign * axis.pitch * job.wavenumber;
+    let scale = p.sign * axis.pitch * tile.wavenumber;
     let second = 0.5 * scale * bend * step;
     let f = [(scale * s) as f32, second as f32, (-second * s * step) as f32];
-    let edge = match job.limit {
+    let edge = match tile.limit {
         Limit::None => Edge::Flat,
         Limit::Hard => {
             let limit = p.distance * axis.tangent;

@@ -9,7 +9,7 @@
 //! [`BATCH`]·[`LARGEST`]² < 2³¹, so what the differences leave modulo 2³² is the value itself.
 
 use super::batch::{BATCH, Batch};
-use super::factor::{self, Factor, Job, Relative};
+use super::factor::{self, Factor, Relative, Tile};
 use super::fixed::{FULL, Indexes, LONGEST, Strength, UNIT, Wave, evaluate, pair};
 use super::kernel::{Panels, ROWS, stride};
 use super::shape::COLUMNS;
@@ -56,27 +56,27 @@ struct Block {
 /// Adds a batch of points to the tile in `panels`.
 ///
 /// # Safety
-/// The processor has the features below. `panels` has been cleared for the job's size; width is a multiple of
+/// The processor has the features below. `panels` has been cleared for the tile's size; width is a multiple of
 /// [`COLUMNS`], height of [`ROWS`]; at most [`BATCH`] points.
 #[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl,avx512vnni,avx2,fma")]
-pub(super) unsafe fn add_batch(job: &Job, points: &[Relative], panels: &mut Panels) {
-    assert!(points.len() <= BATCH && job.width.is_multiple_of(COLUMNS) && job.height.is_multiple_of(ROWS));
-    let half = [0.5 * (job.width as f64 - 1.0), 0.5 * (job.height as f64 - 1.0)];
-    let batch = Batch::new(job, points, half);
+pub(super) unsafe fn add_batch(tile: &Tile, points: &[Relative], panels: &mut Panels) {
+    assert!(points.len() <= BATCH && tile.width.is_multiple_of(COLUMNS) && tile.height.is_multiple_of(ROWS));
+    let half = [0.5 * (tile.width as f64 - 1.0), 0.5 * (tile.height as f64 - 1.0)];
+    let batch = Batch::new(tile, points, half);
     let unit = [batch.peak(0, |k| batch.amplitude[k], half[0]), batch.peak(1, |_| 1.0, half[1])];
     if unit[0] == 0.0 {
         return;
     }
-    let stride = stride(job.height);
+    let stride = stride(tile.height);
     let x = panels.x.values_mut();
     let y = panels.y.values_mut();
-    assert!(x.len() >= PAIRS * 3 * job.width && y.len() >= PAIRS * 3 * stride);
+    assert!(x.len() >= PAIRS * 3 * tile.width && y.len() >= PAIRS * 3 * stride);
     let (x, y) = (x.as_mut_ptr().cast::<i32>(), y.as_mut_ptr().cast::<i32>());
     let columns = Panel {
         axis: 0,
         unit: unit[0],
         half: half[0],
-        vectors: job.width / 16,
+        vectors: tile.width / 16,
         pair: 3 * COLUMNS,
         part: COLUMNS,
         block: PAIRS * 3 * COLUMNS,
@@ -87,7 +87,7 @@ pub(super) unsafe fn add_batch(job: &Job, points: &[Relative], panels: &mut Pane
         axis: 1,
         unit: unit[1],
         half: half[1],
-        vectors: job.height.div_ceil(16),
+        vectors: tile.height.div_ceil(16),
         pair: 3 * stride,
         part: stride,
         block: 16,
@@ -96,18 +96,18 @@ pub(super) unsafe fn add_batch(job: &Job, points: &[Relative], panels: &mut Pane
     };
     // SAFETY: as asserted.
     unsafe {
-        fill(job, points, &batch, &columns);
-        fill(job, points, &batch, &rows);
+        fill(tile, points, &batch, &columns);
+        fill(tile, points, &batch, &rows);
     }
     let scale = (unit[0] * unit[1] / (UNIT * UNIT)) as f32;
     let (re, im) = (panels.re.values_mut(), panels.im.values_mut());
-    assert!(re.len() >= job.width * job.height && im.len() >= job.width * job.height);
-    for column in 0..job.width / COLUMNS {
-        for row in 0..job.height / ROWS {
-            let at = row * ROWS * job.width + column * COLUMNS;
+    assert!(re.len() >= tile.width * tile.height && im.len() >= tile.width * tile.height);
+    for column in 0..tile.width / COLUMNS {
+        for row in 0..tile.height / ROWS {
+            let at = row * ROWS * tile.width + column * COLUMNS;
             // SAFETY: the block lies inside the tile, every pair's factors were filled above.
             unsafe {
-                let to = Block { re: re.as_mut_ptr().add(at), im: im.as_mut_ptr().add(at), width: job.width };
+                let to = Block { re: re.as_mut_ptr().add(at), im: im.as_mut_ptr().add(at), width: tile.width };
                 let (x, y) = (x.add(column * columns.block), y.add(row * ROWS));
                 product(points.len().div_ceil(2), x, y, stride, &to, scale);
             }
@@ -118,7 +118,7 @@ pub(super) unsafe fn add_batch(job: &Job, points: &[Relative], panels: &mut Pane
 /// Factors of every pair along an axis.
 #[inline]
 #[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl,avx512vnni,avx2,fma")]
-unsafe fn fill(job: &Job, points: &[Relative], batch: &Batch, panel: &Panel) {
+unsafe fn fill(tile: &Tile, points: &[Relative], batch: &Batch, panel: &Panel) {
     let Panel { axis, half, vectors, to, .. } = *panel;
     let inverse = 1.0 / panel.unit;
     let amplitude = |k: usize| inverse * if axis == 0 { batch.amplitude[k] } else { 1.0 };
@@ -128,7 +128,7 @@ unsafe fn fill(job: &Job, points: &[Relative], batch: &Batch, panel: &Panel) {
     };
     let strength = |k: usize| Strength::of(amplitude(k), batch.slope[axis][k]);
     let tapered = |k: usize| {
-        let mut found = batch.tapered(job, points.get(k)?, k, axis, half);
+        let mut found = batch.tapered(tile, points.get(k)?, k, axis, half);
         found.amplitude = (amplitude(k) * UNIT) as f32;
         Some(found)
     };

@@ -5,7 +5,7 @@
 //! [`super::shape`].
 
 use super::batch::{BATCH, Batch};
-use super::factor::{Job, Relative, evaluate};
+use super::factor::{Relative, Tile, evaluate};
 use super::shape::{COLUMNS, Kernel};
 use crate::hologram::lanes::{Aligned, Lanes};
 
@@ -73,26 +73,26 @@ impl Panels {
 /// Adds a batch of points to the tile in `panels`.
 ///
 /// # Safety
-/// The instruction set of `L` must be enabled. `panels` has been cleared for the job's size; width is a multiple of
+/// The instruction set of `L` must be enabled. `panels` has been cleared for the tile's size; width is a multiple of
 /// [`COLUMNS`], height of [`ROWS`]; at most [`BATCH`] points.
 #[inline(always)]
-pub(super) unsafe fn add_batch<L: Lanes>(job: &Job, points: &[Relative], panels: &mut Panels) {
-    assert!(points.len() <= BATCH && job.width.is_multiple_of(COLUMNS) && job.height.is_multiple_of(ROWS));
+pub(super) unsafe fn add_batch<L: Lanes>(tile: &Tile, points: &[Relative], panels: &mut Panels) {
+    assert!(points.len() <= BATCH && tile.width.is_multiple_of(COLUMNS) && tile.height.is_multiple_of(ROWS));
     let block = block_columns::<L>();
-    let [half_x, half_y] = [job.width, job.height].map(|size| 0.5 * (size as f64 - 1.0));
+    let [half_x, half_y] = [tile.width, tile.height].map(|size| 0.5 * (size as f64 - 1.0));
     let lanes: [f32; 16] = std::array::from_fn(|i| i as f32);
     let (x, y, line) = (panels.x.values_mut(), panels.y.values_mut(), panels.line.values_mut());
-    let lines = job.height.next_multiple_of(16);
-    let batch = Batch::new(job, points, [half_x, half_y]);
+    let lines = tile.height.next_multiple_of(16);
+    let batch = Batch::new(tile, points, [half_x, half_y]);
     for k in 0..points.len() {
-        let fx = batch.factor(job, points, k, 0, half_x);
-        let fy = batch.factor(job, points, k, 1, half_y);
+        let fx = batch.factor(tile, points, k, 0, half_x);
+        let fy = batch.factor(tile, points, k, 1, half_y);
         // SAFETY: block·2·BATCH values for each block of columns, so the offsets end below BATCH·2·width; `line` has
         // 2·lines values and `y` 2·BATCH·height, as cleared.
         unsafe {
             let lane = L::load(lanes.as_ptr());
             let mut u = 0;
-            while u < job.width {
+            while u < tile.width {
                 let (re, im) = evaluate(&fx, lane.add(L::splat(u as f32 - half_x as f32)));
                 let to = x.as_mut_ptr().add((u / block * BATCH + k) * 2 * block + u % block);
                 re.store(to);
@@ -100,13 +100,13 @@ pub(super) unsafe fn add_batch<L: Lanes>(job: &Job, points: &[Relative], panels:
                 u += L::COUNT;
             }
             let mut v = 0;
-            while v < job.height {
+            while v < tile.height {
                 let (re, im) = evaluate(&fy, lane.add(L::splat(v as f32 - half_y as f32)));
                 re.store(line.as_mut_ptr().add(v));
                 im.store(line.as_mut_ptr().add(lines + v));
                 v += L::COUNT;
             }
-            for rows in 0..job.height / ROWS {
+            for rows in 0..tile.height / ROWS {
                 let to = y.as_mut_ptr().add((rows * BATCH + k) * 2 * ROWS);
                 let from = line.as_ptr().add(rows * ROWS);
                 std::ptr::copy_nonoverlapping(from, to, ROWS);
@@ -115,18 +115,18 @@ pub(super) unsafe fn add_batch<L: Lanes>(job: &Job, points: &[Relative], panels:
         }
     }
     let (re, im) = (panels.re.values_mut(), panels.im.values_mut());
-    for columns in 0..job.width / block {
-        for rows in 0..job.height / ROWS {
+    for columns in 0..tile.width / block {
+        for rows in 0..tile.height / ROWS {
             let x = &panels.x.values()[columns * BATCH * 2 * block..];
             let y = &panels.y.values()[rows * BATCH * 2 * ROWS..];
-            let at = rows * ROWS * job.width + columns * block;
+            let at = rows * ROWS * tile.width + columns * block;
             // SAFETY: the block lies inside the tile, the panels were filled above for every point.
             unsafe {
                 let (re, im) = (re.as_mut_ptr().add(at), im.as_mut_ptr().add(at));
                 if L::COUNT == 16 {
-                    product::<L, 2>(points.len(), x.as_ptr(), y.as_ptr(), re, im, job.width);
+                    product::<L, 2>(points.len(), x.as_ptr(), y.as_ptr(), re, im, tile.width);
                 } else {
-                    product::<L, 1>(points.len(), x.as_ptr(), y.as_ptr(), re, im, job.width);
+                    product::<L, 1>(points.len(), x.as_ptr(), y.as_ptr(), re, im, tile.width);
                 }
             }
         }

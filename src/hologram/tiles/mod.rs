@@ -35,7 +35,7 @@ use super::lanes::{InstructionSet, dispatch};
 use super::sources::{PointSum, Source, contrast, tilt};
 use crate::error::Result;
 use crate::field::{Complex32, Field};
-use factor::{Job, Relative};
+use factor::{Relative, Tile};
 use kernel::{LONG_BATCH, Panels, add_batch};
 use pixels::add_exact;
 use rayon::prelude::*;
@@ -199,7 +199,7 @@ pub(crate) fn add(field: &mut Field, sum: &PointSum, class: &Class, set: Instruc
     let limit = Limit::new(sum.cull, &table);
     let axes = [Axis::new(optics, 0, limit), Axis::new(optics, 1, limit)];
     let Shape { width, height, kernel, .. } = class.shape;
-    let job = Job { width, height, axes: &axes, wavenumber: 1.0 / optics.wavelength, limit };
+    let tile = Tile { width, height, axes: &axes, wavenumber: 1.0 / optics.wavelength, limit };
     let most = kernel::batch(kernel);
     let members = class.members(sum.sources);
     let tangent = class.tangent(optics, limit);
@@ -209,8 +209,8 @@ pub(crate) fn add(field: &mut Field, sum: &PointSum, class: &Class, set: Instruc
     for wave in tiles.chunks(WAVE) {
         let results: Vec<Option<Panels>> = wave
             .par_iter()
-            .map(|&tile| {
-                let at = [tile % across * width, tile / across * height];
+            .map(|&number| {
+                let at = [number % across * width, number / across * height];
                 let mut panels = Panels::default();
                 panels.clear(width, height, kernel);
                 let center = grid.middle(at, [width, height]);
@@ -234,12 +234,12 @@ pub(crate) fn add(field: &mut Field, sum: &PointSum, class: &Class, set: Instruc
                         if progress.stopped() {
                             return None;
                         }
-                        flush(set, &job, &batch[..count], &mut panels, kernel);
+                        flush(set, &tile, &batch[..count], &mut panels, kernel);
                         (count, lit) = (0, true);
                     }
                 }
                 if count > 0 {
-                    flush(set, &job, &batch[..count], &mut panels, kernel);
+                    flush(set, &tile, &batch[..count], &mut panels, kernel);
                 }
                 progress.advance(work);
                 (lit || count > 0).then_some(panels)
@@ -251,9 +251,9 @@ pub(crate) fn add(field: &mut Field, sum: &PointSum, class: &Class, set: Instruc
         let last = wave[wave.len() - 1] / across;
         let bands = field.samples.par_chunks_mut(grid.width * height).enumerate().skip(first).take(last + 1 - first);
         bands.for_each(|(row, band)| {
-            for (&tile, panels) in wave.iter().zip(&results).filter(|(tile, _)| **tile / across == row) {
+            for (&number, panels) in wave.iter().zip(&results).filter(|(number, _)| **number / across == row) {
                 if let Some(panels) = panels {
-                    scatter(band, grid.width, tile % across * width, width, panels);
+                    scatter(band, grid.width, number % across * width, width, panels);
                 }
             }
         });
@@ -261,18 +261,18 @@ pub(crate) fn add(field: &mut Field, sum: &PointSum, class: &Class, set: Instruc
     Ok(())
 }
 
-fn flush(set: InstructionSet, job: &Job, points: &[Relative], panels: &mut Panels, kernel: Kernel) {
+fn flush(set: InstructionSet, tile: &Tile, points: &[Relative], panels: &mut Panels, kernel: Kernel) {
     // SAFETY: the set was detected on this machine, integers and bfloat16 were chosen for one that has them; the panels
-    // were cleared for this job and kernel.
+    // were cleared for this tile and kernel.
     unsafe {
         match kernel {
-            Kernel::Paths => dispatch!(set, add_exact(job: &Job, points: &[Relative], panels: &mut Panels)),
+            Kernel::Paths => dispatch!(set, add_exact(tile: &Tile, points: &[Relative], panels: &mut Panels)),
             #[cfg(target_arch = "x86_64")]
-            Kernel::Integer => integer::add_batch(job, points, panels),
+            Kernel::Integer => integer::add_batch(tile, points, panels),
             #[cfg(target_arch = "x86_64")]
-            Kernel::Bfloat => bfloat::add_batch::<Amx>(job, points, panels),
+            Kernel::Bfloat => bfloat::add_batch::<Amx>(tile, points, panels),
             _ => {
-                dispatch!(set, add_batch(job: &Job, points: &[Relative], panels: &mut Panels));
+                dispatch!(set, add_batch(tile: &Tile, points: &[Relative], panels: &mut Panels));
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The inner loop where the sphere is not separable over a tile: every pixel from its own path.
 
-use super::factor::{Axis, Job, Limit, Relative, taper};
+use super::factor::{Axis, Limit, Relative, Tile, taper};
 use super::kernel::Panels;
 use super::shape::COLUMNS;
 use crate::hologram::lanes::{Lanes, cos_sin};
@@ -11,22 +11,22 @@ use crate::hologram::lanes::{Lanes, cos_sin};
 /// # Safety
 /// As [`super::kernel::add_batch`].
 #[inline(always)]
-pub(super) unsafe fn add_exact<L: Lanes>(job: &Job, points: &[Relative], panels: &mut Panels) {
-    assert!(job.width.is_multiple_of(COLUMNS));
-    let (half_x, half_y) = (0.5 * (job.width as f64 - 1.0), 0.5 * (job.height as f64 - 1.0));
+pub(super) unsafe fn add_exact<L: Lanes>(tile: &Tile, points: &[Relative], panels: &mut Panels) {
+    assert!(tile.width.is_multiple_of(COLUMNS));
+    let (half_x, half_y) = (0.5 * (tile.width as f64 - 1.0), 0.5 * (tile.height as f64 - 1.0));
     let lanes: [f32; 16] = std::array::from_fn(|i| i as f32);
     let (re, im) = (panels.re.values_mut(), panels.im.values_mut());
-    for row in 0..job.height {
+    for row in 0..tile.height {
         for p in points {
-            let dy = p.dy + (row as f64 - half_y) * job.axes[1].pitch;
+            let dy = p.dy + (row as f64 - half_y) * tile.axes[1].pitch;
             // A tenth of a wavelength keeps the expansion finite on a pixel that the point sits on.
-            let r = (p.dx * p.dx + dy * dy + p.distance * p.distance).sqrt().max(0.1 / job.wavenumber);
-            let exact = Exact::new(job, p, dy, r);
+            let r = (p.dx * p.dx + dy * dy + p.distance * p.distance).sqrt().max(0.1 / tile.wavenumber);
+            let exact = Exact::new(tile, p, dy, r);
             let mut u = 0;
-            while u < job.width {
+            while u < tile.width {
                 // SAFETY: a vector at column u of a row of the tile.
                 unsafe {
-                    let at = row * job.width + u;
+                    let at = row * tile.width + u;
                     let lane = L::load(lanes.as_ptr()).add(L::splat(u as f32 - half_x as f32));
                     let (a, b) = exact.at(lane);
                     let (re, im) = (re.as_mut_ptr().add(at), im.as_mut_ptr().add(at));
@@ -66,31 +66,31 @@ enum ExactEdge<'a> {
 }
 
 impl<'a> Exact<'a> {
-    fn new(job: &Job<'a>, p: &Relative, dy: f64, r: f64) -> Self {
-        let turns = p.sign * r * job.wavenumber + p.turns;
+    fn new(tile: &Tile<'a>, p: &Relative, dy: f64, r: f64) -> Self {
+        let turns = p.sign * r * tile.wavenumber + p.turns;
         let (s, sine_y) = (p.dx / r, (dy / r).abs());
         let mut amplitude = p.amplitude / r;
-        let edge = match job.limit {
+        let edge = match tile.limit {
             Limit::None => ExactEdge::Flat,
             Limit::Hard => {
-                if dy.abs() > p.distance * job.axes[1].tangent {
+                if dy.abs() > p.distance * tile.axes[1].tangent {
                     amplitude = 0.0;
                 }
-                ExactEdge::Hard((p.distance * job.axes[0].tangent / r) as f32)
+                ExactEdge::Hard((p.distance * tile.axes[0].tangent / r) as f32)
             }
             Limit::Soft(table) => {
                 let of = |axis: &Axis, sine: f64| {
                     (axis.scale as f32, axis.offset as f32, table.level(axis.edge * (1.0 - sine * sine) / r))
                 };
-                let (x, y) = (of(&job.axes[0], s), of(&job.axes[1], sine_y));
+                let (x, y) = (of(&tile.axes[0], s), of(&tile.axes[1], sine_y));
                 ExactEdge::Soft { scale: [x.0, y.0], offset: [x.1, y.1], sine_y: sine_y as f32, levels: [x.2, y.2] }
             }
         };
         Self {
             base: (turns - turns.floor()) as f32,
-            step: (job.axes[0].pitch / r) as f32,
+            step: (tile.axes[0].pitch / r) as f32,
             s: s as f32,
-            turns: (p.sign * r * job.wavenumber) as f32,
+            turns: (p.sign * r * tile.wavenumber) as f32,
             amplitude: amplitude as f32,
             sign: p.sign as f32,
             edge,

@@ -31,7 +31,7 @@ fn both(kernel: Kernel, width: usize, height: usize, points: &[Relative]) -> [Ve
     let table = EdgeTable::new(0.1, 0.5, &Progress::new());
     let limit = Limit::Soft(&table);
     let axes = [Axis::new(&optics, 0, limit), Axis::new(&optics, 1, limit)];
-    let job = Job { width, height, axes: &axes, wavenumber: 1.0 / WAVELENGTH, limit };
+    let tile = Tile { width, height, axes: &axes, wavenumber: 1.0 / WAVELENGTH, limit };
     [kernel, Kernel::Float].map(|kernel| {
         let mut panels = Panels::default();
         panels.clear(width, height, kernel);
@@ -39,9 +39,9 @@ fn both(kernel: Kernel, width: usize, height: usize, points: &[Relative]) -> [Ve
             // SAFETY: detected by the caller; cleared above.
             unsafe {
                 match kernel {
-                    Kernel::Integer => integer::add_batch(&job, points, &mut panels),
-                    Kernel::Bfloat => bfloat::add_batch::<Plain>(&job, points, &mut panels),
-                    Kernel::Float | Kernel::Paths => add_batch::<Portable>(&job, points, &mut panels),
+                    Kernel::Integer => integer::add_batch(&tile, points, &mut panels),
+                    Kernel::Bfloat => bfloat::add_batch::<Plain>(&tile, points, &mut panels),
+                    Kernel::Float | Kernel::Paths => add_batch::<Portable>(&tile, points, &mut panels),
                 }
             }
         }
