@@ -29,7 +29,7 @@ use std::sync::{Arc, LazyLock, Mutex};
 
 /// Planned transforms of lines of one length, neither direction with a factor; usable from any number of threads.
 #[derive(Clone)]
-pub struct Fft1<T: FftNum> {
+pub(crate) struct Fft1<T: FftNum> {
     forward: Arc<dyn Fft<T>>,
     inverse: Arc<dyn Fft<T>>,
 }
@@ -42,7 +42,7 @@ impl<T: FftNum> std::fmt::Debug for Fft1<T> {
 
 impl<T: FftNum> Fft1<T> {
     /// Transforms of a length; each length is planned once in the life of the process.
-    pub fn new(length: usize) -> Self {
+    pub(crate) fn new(length: usize) -> Self {
         /// A planner of each precision; it keeps its plans.
         static PLANNERS: LazyLock<Mutex<HashMap<TypeId, Box<dyn Any + Send>>>> = LazyLock::new(Mutex::default);
         // A thread that panicked while it planned left the planner as it was.
@@ -53,30 +53,29 @@ impl<T: FftNum> Fft1<T> {
         Self { forward: planner.plan_fft_forward(length), inverse: planner.plan_fft_inverse(length) }
     }
     /// Samples of a line.
-    #[allow(clippy::len_without_is_empty)] // a line has at least one sample
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.forward.len()
     }
     /// `count` dark samples.
-    pub fn dark(count: usize) -> Vec<Complex<T>> {
+    fn dark(count: usize) -> Vec<Complex<T>> {
         vec![Complex::new(T::zero(), T::zero()); count]
     }
     /// Memory that a thread's transforms need, in either direction.
-    pub fn scratch(&self) -> Vec<Complex<T>> {
+    pub(crate) fn scratch(&self) -> Vec<Complex<T>> {
         Self::dark(self.forward.get_inplace_scratch_len().max(self.inverse.get_inplace_scratch_len()))
     }
     /// Σ u(n)·exp(−i2πkn/N) of each line, in place.
-    pub fn forward(&self, lines: &mut [Complex<T>], scratch: &mut [Complex<T>]) {
+    pub(crate) fn forward(&self, lines: &mut [Complex<T>], scratch: &mut [Complex<T>]) {
         self.forward.process_with_scratch(lines, scratch);
     }
     /// Σ u(n)·exp(+i2πkn/N) of each line, in place, without 1/N.
-    pub fn inverse(&self, lines: &mut [Complex<T>], scratch: &mut [Complex<T>]) {
+    pub(crate) fn inverse(&self, lines: &mut [Complex<T>], scratch: &mut [Complex<T>]) {
         self.inverse.process_with_scratch(lines, scratch);
     }
 }
 
 /// The smallest `step`·2^a·3^b·5^c, times one of `others`, that is not below `least`: lengths that transforms are fast at.
-pub fn fast_length(least: usize, step: usize, others: &[usize]) -> usize {
+pub(crate) fn fast_length(least: usize, step: usize, others: &[usize]) -> usize {
     let rest = |mut n: usize| {
         for prime in [2, 3, 5] {
             while n.is_multiple_of(prime) {

@@ -125,7 +125,7 @@ impl Grid {
 }
 
 /// Offset of sample `index` of `count` from their middle [m]; both may be of any integer type.
-pub fn offset(index: f64, count: f64, pitch: f64) -> f64 {
+pub(crate) fn offset(index: f64, count: f64, pitch: f64) -> f64 {
     (index - (count - 1.0) * 0.5) * pitch
 }
 
@@ -146,7 +146,7 @@ pub(crate) fn finite(name: &'static str, distance: f64) -> Result<()> {
 }
 
 /// Spatial frequency of `cycles` over `count` samples [cycles/m].
-pub fn frequency(cycles: i64, count: usize, pitch: f64) -> f64 {
+pub(crate) fn frequency(cycles: i64, count: usize, pitch: f64) -> f64 {
     cycles as f64 / (count as f64 * pitch)
 }
 

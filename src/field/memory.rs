@@ -9,7 +9,7 @@ const LARGE: usize = 8 << 20;
 ///
 /// A page that is read before it is written costs two faults, one of them with an interrupt of all cores: store to
 /// fresh memory, do not add to it.
-pub fn zeroed<T: Zeroable>(count: usize) -> Vec<T> {
+pub(crate) fn zeroed<T: Zeroable>(count: usize) -> Vec<T> {
     let memory = bytemuck::zeroed_vec(count);
     prefer_large_pages(&memory);
     memory

@@ -6,9 +6,10 @@ mod memory;
 pub mod npy;
 pub mod npy_stack;
 
-pub use fft::{Fft1, Fft2, FftNum, fast_length};
+pub(crate) use fft::{Fft1, fast_length};
+pub use fft::{Fft2, FftNum};
 pub use grid::Grid;
-pub use memory::zeroed;
+pub(crate) use memory::zeroed;
 pub use num_complex::{Complex, Complex32, Complex64};
 
 use crate::error::{Error, Result};
@@ -42,10 +43,6 @@ impl Field<f32> {
             return Err(Error::parameter("field", what));
         }
         Ok(Self { grid, wavelength, samples })
-    }
-    /// Wavenumber k = 2π/λ [rad/m].
-    pub fn wavenumber(&self) -> f64 {
-        std::f64::consts::TAU / self.wavelength
     }
     /// Σ|u|², without the pixel's area: what a unitary step keeps.
     pub fn energy(&self) -> f64 {

@@ -110,7 +110,7 @@ pub struct Array<T> {
 }
 
 /// Complex samples of an H×W array: complex64 or complex128 as they are, a real array as a phase [rad] of amplitude 1.
-pub fn read_complex(path: &Path) -> Result<Array<Complex32>> {
+fn read_complex(path: &Path) -> Result<Array<Complex32>> {
     let npy = open(path)?;
     let (width, height, channels) = shape(path, npy.shape(), npy.order())?;
     if channels != 1 {

@@ -40,7 +40,7 @@ use std::f64::consts::PI;
 use std::sync::LazyLock;
 
 /// τ: the part of the band over which W falls.
-pub const ROLL_OFF: f64 = 0.3;
+pub(crate) const ROLL_OFF: f64 = 0.3;
 
 /// Half the fall in units of s: erfc(2.63)/2 = 1.0e-4.
 const EDGE: f64 = 2.63;
@@ -50,13 +50,13 @@ const WIDEST: f64 = 0.6;
 
 /// The taper W along one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Taper {
+pub(crate) struct Taper {
     /// Band limit B = 1/(2·pitch), at most 0.6/λ [cycles/m].
-    pub limit: f64,
+    pub(crate) limit: f64,
     /// Middle of the edge b [cycles/m].
-    pub middle: f64,
+    pub(crate) middle: f64,
     /// Width of the edge s [cycles/m].
-    pub width: f64,
+    pub(crate) width: f64,
 }
 
 impl Taper {
@@ -65,54 +65,54 @@ impl Taper {
         Self { limit, middle: limit * (1.0 - 0.5 * ROLL_OFF), width: ROLL_OFF * limit / (2.0 * EDGE) }
     }
     /// W(f), f in [cycles/m].
-    pub fn at(&self, f: f64) -> f64 {
+    pub(crate) fn at(&self, f: f64) -> f64 {
         0.5 * erfc(Complex64::new((f.abs() - self.middle) / self.width, 0.0)).re
     }
     /// The frequency from which on W is below erfc(`edges`)/2 [cycles/m].
-    pub fn reach(&self, edges: f64) -> f64 {
+    pub(crate) fn reach(&self, edges: f64) -> f64 {
         self.middle + edges * self.width
     }
 }
 
 /// What is common to all points: wavelength and the taper of each axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Optics {
+pub(crate) struct Optics {
     /// Vacuum wavelength λ [m].
-    pub wavelength: f64,
+    pub(crate) wavelength: f64,
     /// Taper along x and y.
-    pub taper: [Taper; 2],
+    pub(crate) taper: [Taper; 2],
     /// Pixel pitch along x and y [m].
-    pub pitch: [f64; 2],
+    pub(crate) pitch: [f64; 2],
 }
 
 impl Optics {
     /// The definition's constants for a grid; refuses a wavelength that is not positive and finite.
-    pub fn new(grid: &Grid, wavelength: f64) -> Result<Self> {
+    pub(crate) fn new(grid: &Grid, wavelength: f64) -> Result<Self> {
         grid::positive("wavelength", wavelength)?;
         let pitch = grid.pitch();
         Ok(Self { wavelength, taper: pitch.map(|p| Taper::new(p, wavelength)), pitch })
     }
     /// 1/q of the far form at the coarser axis: the Fresnel number of the taper's edge, π λ r s².
-    pub fn edge_fresnel_number(&self, distance: f64) -> f64 {
+    pub(crate) fn edge_fresnel_number(&self, distance: f64) -> f64 {
         let width = self.taper[0].width.min(self.taper[1].width);
         PI * self.wavelength * distance * width * width
     }
     /// Half width of the cone along an axis, on the panel: |Δ| = |z|·tan(asin(λB)) [m].
-    pub fn cone(&self, axis: usize, distance: f64) -> f64 {
+    pub(crate) fn cone(&self, axis: usize, distance: f64) -> f64 {
         let sine = self.wavelength * self.taper[axis].limit;
         distance * sine / (1.0 - sine * sine).sqrt()
     }
     /// Error of the far form with its cross term at this distance (relative L2 over the point's cone).
-    pub fn far_error(&self, distance: f64) -> f64 {
+    pub(crate) fn far_error(&self, distance: f64) -> f64 {
         let pitch = self.pitch[0].max(self.pitch[1]);
         150.0 * (pitch / distance).powi(2)
     }
     /// Error of the far form without its cross term.
-    pub fn separable_far_error(&self, distance: f64) -> f64 {
+    pub(crate) fn separable_far_error(&self, distance: f64) -> f64 {
         self.wavelength / distance + self.far_error(distance)
     }
     /// T and dT/d|f| of the far form for a diverging wave, at frequency |f| and distance r.
-    pub fn edge(&self, axis: usize, f: f64, r: f64) -> (Complex64, Complex64) {
+    pub(crate) fn edge(&self, axis: usize, f: f64, r: f64) -> (Complex64, Complex64) {
         let taper = self.taper[axis];
         let sine = self.wavelength * f;
         let q = (1.0 - sine * sine) / (PI * self.wavelength * r * taper.width * taper.width);
@@ -129,7 +129,7 @@ impl Optics {
         (0.5 * erfc_with(v, gauss), -gauss * inverse / (taper.width * PI.sqrt()))
     }
     /// The far form for a diverging wave of unit amplitude and phase zero, Δ and distance from the panel in metres.
-    pub fn far(&self, dx: f64, dy: f64, distance: f64) -> Complex64 {
+    pub(crate) fn far(&self, dx: f64, dy: f64, distance: f64) -> Complex64 {
         let r = (dx * dx + dy * dy + distance * distance).sqrt();
         let (fx, fy) = (dx.abs() / (self.wavelength * r), dy.abs() / (self.wavelength * r));
         // Beyond seven widths of the widest edge that this form is used for, T is below 1e-12.
@@ -148,7 +148,7 @@ impl Optics {
 ///
 /// erfc(z) = e^{−z²}·w(iz) for Re z ≥ 0 with the rational series of Weideman, "Computation of the complex error
 /// function", SIAM J. Numer. Anal. 31 (1994), eq. 38: w(iz) = 2/(L + z)²·Σ aₙZⁿ + 1/(√π(L + z)), Z = (L − z)/(L + z).
-pub fn erfc(z: Complex64) -> Complex64 {
+pub(crate) fn erfc(z: Complex64) -> Complex64 {
     erfc_with(z, (-z * z).exp())
 }
 

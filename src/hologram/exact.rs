@@ -4,7 +4,7 @@ use super::definition::Optics;
 #[cfg(feature = "gpu")]
 use super::gpu;
 use super::lanes::InstructionSet;
-use super::sources::{PointSum, Source};
+use super::sources::{PointSum, PointWave};
 use super::tiles::{self, Class, Products};
 use super::{Cull, near, recurrence};
 #[cfg(not(feature = "gpu"))]
@@ -50,7 +50,7 @@ impl Division {
     /// Divides points for a wanted error and the products that the engine has; incomplete when asked to stop.
     pub(crate) fn new(sum: &PointSum, products: Products, error: f64) -> Self {
         let PointSum { optics, sources, cull, .. } = *sum;
-        let is_near = |source: &Source| {
+        let is_near = |source: &PointWave| {
             let inexact = optics.edge_fresnel_number(source.distance) < NEAREST_EDGE
                 || optics.separable_far_error(source.distance) > 0.5 * error;
             cull == Cull::Soft && inexact && near::rank(optics, source.distance).is_some()

@@ -3,6 +3,25 @@
 //! [`definition`] says what the field of a point is; [`oracle`] computes exactly that, slowly. The engines are a closed
 //! set ([`Method`]), each tested against the oracle as a complex field. [`plan`] chooses one for a wanted error and says
 //! why, in what time and memory; [`compute`] runs it.
+//!
+//! ```
+//! use glam::DVec3;
+//! use holodrive::field::{Grid, relative_error};
+//! use holodrive::hologram::{Cull, HologramSettings, compute, oracle, plan};
+//! use holodrive::points::PointSource;
+//! use holodrive::progress::Progress;
+//!
+//! // Ten points some 10 cm behind a small panel: the engine that is chosen keeps the bound that it states.
+//! let panel = Grid::new(64, 48, 8e-6, 8e-6)?;
+//! let position = |i: f64| DVec3::new(1e-5 * i, -2e-5 * i, -0.1 - 1e-3 * i);
+//! let point = |i| PointSource { position: position(f64::from(i)), amplitude: 1.0, phase: f64::from(i) };
+//! let points: Vec<PointSource> = (0..10).map(point).collect();
+//! let plan = plan(&points, &panel, 532e-9, &HologramSettings::default())?;
+//! let found = compute(&points, &panel, 532e-9, &plan, &Progress::new())?;
+//! let exact = oracle(&points, &panel, 532e-9, Cull::Soft)?;
+//! assert!(relative_error(&found.field.samples, &exact.samples) < found.report.error_bound);
+//! # Ok::<(), holodrive::Error>(())
+//! ```
 
 pub mod definition;
 mod dispersion;
@@ -104,6 +123,7 @@ impl Default for HologramSettings {
 
 /// What will be done, why, and at what cost.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Plan {
     /// The engine.
     pub method: Method,
@@ -124,6 +144,7 @@ pub struct Plan {
 
 /// What was done.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct HologramReport {
     /// The engine.
     pub method: Method,

@@ -15,7 +15,7 @@
 //! product is the integrand itself.
 
 use super::definition::Optics;
-use super::sources::{PointSum, Source};
+use super::sources::{PointSum, PointWave};
 use crate::error::Result;
 use crate::field::{Complex32, Complex64, Fft1, Field, Grid};
 use rayon::prelude::*;
@@ -58,7 +58,7 @@ pub(crate) fn rank(optics: &Optics, distance: f64) -> Option<usize> {
 }
 
 /// Memory of a batch of kernels [bytes].
-pub(crate) fn bytes(optics: &Optics, sources: &[Source], indexes: &[usize]) -> u64 {
+pub(crate) fn bytes(optics: &Optics, sources: &[PointWave], indexes: &[usize]) -> u64 {
     let largest = indexes.iter().map(|&i| {
         let distance = sources[i].distance;
         let span: f64 = (0..2).map(|axis| 2.0 * (optics.cone(axis, distance) / optics.pitch[axis] + TAIL) + 2.0).sum();
@@ -69,7 +69,7 @@ pub(crate) fn bytes(optics: &Optics, sources: &[Source], indexes: &[usize]) -> u
 
 /// Predicted work [core-seconds]: transforms and spectra of the kernels, and the products on the patch; fitted to 30 to
 /// 3,000 points within 6 cm of a panel of 1080p at 8 µm.
-pub(crate) fn core_seconds(optics: &Optics, sources: &[Source], indexes: &[usize]) -> f64 {
+pub(crate) fn core_seconds(optics: &Optics, sources: &[PointWave], indexes: &[usize]) -> f64 {
     let one = |&i: &usize| {
         let cone = [0, 1].map(|axis| 2.0 * (optics.cone(axis, sources[i].distance) / optics.pitch[axis]));
         let lines: f64 = cone.iter().map(|c| ((c + 2.0 * SILENCE) as usize + 2).next_power_of_two() as f64).sum();
@@ -137,7 +137,7 @@ struct Kernel {
 
 impl Kernel {
     /// The patch of a source; `None` where it misses the panel.
-    fn new(optics: &Optics, source: &Source, grid: &Grid, plans: &mut Plans) -> Option<Self> {
+    fn new(optics: &Optics, source: &PointWave, grid: &Grid, plans: &mut Plans) -> Option<Self> {
         let rank = rank(optics, source.distance).unwrap_or(HIGHEST_RANK);
         let span = |axis: usize, position: f64, count: usize| {
             let reach = optics.cone(axis, source.distance) / optics.pitch[axis] + TAIL;

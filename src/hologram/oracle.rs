@@ -41,21 +41,36 @@ pub(super) fn watched(
     let optics = Optics::new(grid, wavelength)?;
     let columns: Vec<f64> = (0..grid.width).map(|column| grid.x(column)).collect();
     let mut field = Field::<f64>::zeros(*grid, wavelength);
-    let mut rest = points;
-    while !rest.is_empty() {
-        let (now, later) = rest.split_at(group(rest, &optics, cull));
-        let kernels = kernels(now, &optics, cull, progress);
-        progress.check()?;
+    in_groups(points, &optics, cull, progress, |kernels| {
         field.samples.par_chunks_mut(grid.width).enumerate().for_each(|(row, samples)| {
             for kernel in kernels.iter().take_while(|_| !progress.stopped()) {
                 kernel.add(&optics, cull, &columns, grid.y(row), samples, progress);
             }
         });
+    })?;
+    Ok(field)
+}
+
+/// Gives kernels of all points to `add`, as many at once as memory takes.
+fn in_groups(
+    points: &[PointSource],
+    optics: &Optics,
+    cull: Cull,
+    progress: &Progress,
+    mut add: impl FnMut(&[Kernel]),
+) -> Result<()> {
+    let mut rest = points;
+    while !rest.is_empty() {
+        let (now, later) = rest.split_at(group(rest, optics, cull));
+        let lit = |p: &&PointSource| p.amplitude != 0.0 && !progress.stopped();
+        let kernels: Vec<Kernel> = now.par_iter().filter(lit).map(|p| Kernel::new(*p, optics, cull)).collect();
+        progress.check()?;
+        add(&kernels);
         progress.check()?;
         progress.advance(now.len() as u64);
         rest = later;
     }
-    Ok(field)
+    Ok(())
 }
 
 /// The field at sampled pixels (column, row) only, in their order.
@@ -69,16 +84,12 @@ pub fn oracle_at(
     let optics = Optics::new(grid, wavelength)?;
     let progress = Progress::new();
     let mut field = vec![Complex64::default(); pixels.len()];
-    let mut rest = points;
-    while !rest.is_empty() {
-        let (now, later) = rest.split_at(group(rest, &optics, cull));
-        let kernels = kernels(now, &optics, cull, &progress);
+    in_groups(points, &optics, cull, &progress, |kernels| {
         field.par_iter_mut().zip(pixels).for_each(|(u, &(column, row))| {
             let (x, y) = ([grid.x(column)], grid.y(row));
             kernels.iter().for_each(|kernel| kernel.add(&optics, cull, &x, y, std::slice::from_mut(u), &progress));
         });
-        rest = later;
-    }
+    })?;
     Ok(field)
 }
 
@@ -101,11 +112,6 @@ fn group(points: &[PointSource], optics: &Optics, cull: Cull) -> usize {
         sum <= SPECTRA
     };
     points.iter().take(GROUP).take_while(fits).count().max(1)
-}
-
-fn kernels(points: &[PointSource], optics: &Optics, cull: Cull, progress: &Progress) -> Vec<Kernel> {
-    let lit = |p: &&PointSource| p.amplitude != 0.0 && !progress.stopped();
-    points.par_iter().filter(lit).map(|p| Kernel::new(*p, optics, cull)).collect()
 }
 
 /// Whether the integral is summed at this distance, instead of its far form.

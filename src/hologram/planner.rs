@@ -9,7 +9,7 @@ use super::definition::Optics;
 use super::exact::GPU_ROUNDING;
 use super::exact::{DIRECT_ERROR, Division};
 use super::planes::{Cloud, Parameters};
-use super::sources::{Coverage, PointSum, Source, sources};
+use super::sources::{Coverage, PointSum, PointWave, sources};
 use super::tiles::{Kernel, Products, Shape};
 use super::{Cull, HologramSettings, InstructionSet, Method, Plan};
 #[cfg(feature = "gpu")]
@@ -241,7 +241,7 @@ pub fn plan(points: &[PointSource], grid: &Grid, wavelength: f64, settings: &Hol
     let (optics, progress) = (&optics, &Progress::new());
     let sum = PointSum { optics, grid, sources: &sources, cull: settings.cull, progress };
     let pairs = Coverage::of(points.len(), &sum).pairs;
-    let own = (size_of::<Source>() * sources.len()) as u64;
+    let own = (size_of::<PointWave>() * sources.len()) as u64;
     let request = Request { sum, settings, memory: settings.memory.saturating_sub(own) };
     let threads = rayon::current_num_threads() as f64;
     let (mut best, reason) = match settings.method {

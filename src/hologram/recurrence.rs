@@ -20,7 +20,7 @@
 
 use super::definition::Optics;
 use super::lanes::{Aligned, InstructionSet, Lanes, cos_sin, dispatch};
-use super::sources::{PointSum, Source};
+use super::sources::{PointSum, PointWave};
 use super::tiles::{Axis, Class, Limit, taper};
 use crate::error::Result;
 use crate::field::{Field, Grid};
@@ -147,7 +147,7 @@ struct BlockWave {
 }
 
 impl BlockWave {
-    fn new(rows: &RowBlock, s: &Source, dx: f64, dy: f64) -> Self {
+    fn new(rows: &RowBlock, s: &PointWave, dx: f64, dy: f64) -> Self {
         let r = (dx * dx + dy * dy + s.distance * s.distance).sqrt().max(0.1 / rows.wavenumber);
         let turns = s.sign * r * rows.wavenumber;
         let phase = turns + s.turns;

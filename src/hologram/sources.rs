@@ -13,14 +13,14 @@ use rayon::prelude::*;
 pub(crate) struct PointSum<'a> {
     pub(crate) optics: &'a Optics,
     pub(crate) grid: &'a Grid,
-    pub(crate) sources: &'a [Source],
+    pub(crate) sources: &'a [PointWave],
     pub(crate) cull: Cull,
     pub(crate) progress: &'a Progress,
 }
 
 /// A point that shines.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Source {
+pub(crate) struct PointWave {
     /// Position along x [m].
     pub(crate) x: f64,
     /// Position along y [m].
@@ -35,7 +35,7 @@ pub(crate) struct Source {
     pub(crate) turns: f64,
 }
 
-impl Source {
+impl PointWave {
     /// Smallest and largest Δ from the source to a pixel, along x and y [m].
     pub(crate) fn span(&self, grid: &Grid) -> [[f64; 2]; 2] {
         [[grid.x(0) - self.x, grid.x(grid.width - 1) - self.x], [grid.y(grid.height - 1) - self.y, grid.y(0) - self.y]]
@@ -54,17 +54,17 @@ impl Source {
 }
 
 /// Root mean square of sin θ_x·sin θ_y over the pixels that the sources light: what errors of separable forms go with.
-pub(crate) fn tilt(sources: &[Source], grid: &Grid, limit: [f64; 2]) -> f64 {
+pub(crate) fn tilt(sources: &[PointWave], grid: &Grid, limit: [f64; 2]) -> f64 {
     let square = |[low, high]: [f64; 2]| (low * low + low * high + high * high) / 3.0;
-    let one = |s: &Source| s.sines(grid, limit).map(square).iter().product::<f64>();
+    let one = |s: &PointWave| s.sines(grid, limit).map(square).iter().product::<f64>();
     let parts: Vec<f64> = sources.par_chunks(PART).map(|part| part.iter().map(one).sum()).collect();
     (parts.iter().sum::<f64>() / sources.len().max(1) as f64).sqrt()
 }
 
 /// The largest wave on its axis, amplitude/distance, against the root mean square of all over the pixels that they
 /// light: what errors that go with the largest of a group do to the whole. Infinite where nothing is lit.
-pub(crate) fn contrast(sources: &[Source], grid: &Grid, limit: [f64; 2]) -> f64 {
-    let one = |s: &Source| {
+pub(crate) fn contrast(sources: &[PointWave], grid: &Grid, limit: [f64; 2]) -> f64 {
+    let one = |s: &PointWave| {
         // Pixels in units that do not matter, times the light on each.
         let lit: f64 = s.sines(grid, limit).map(|[low, high]| high - low).iter().product();
         let strongest = s.amplitude.abs() / s.distance;
@@ -80,7 +80,7 @@ pub(crate) fn contrast(sources: &[Source], grid: &Grid, limit: [f64; 2]) -> f64 
 const PART: usize = 4096;
 
 /// Checks points and leaves out those of amplitude zero; refuses what is not finite, naming the point.
-pub(crate) fn sources(points: &[PointSource]) -> Result<Vec<Source>> {
+pub(crate) fn sources(points: &[PointSource]) -> Result<Vec<PointWave>> {
     let one = |(i, p): (usize, &PointSource)| {
         if !(p.position.is_finite() && p.amplitude.is_finite() && p.phase.is_finite()) {
             let what = format!(
@@ -90,7 +90,7 @@ pub(crate) fn sources(points: &[PointSource]) -> Result<Vec<Source>> {
             return Err(Error::parameter("points", what));
         }
         let turns = p.phase / std::f64::consts::TAU;
-        let source = Source {
+        let source = PointWave {
             x: p.position.x,
             y: p.position.y,
             distance: p.position.z.abs(),
@@ -101,7 +101,7 @@ pub(crate) fn sources(points: &[PointSource]) -> Result<Vec<Source>> {
         Ok((p.amplitude != 0.0).then_some(source))
     };
     // Parts keep their order, so the first bad point is the one that is named.
-    let parts: Vec<Result<Vec<Source>>> = points
+    let parts: Vec<Result<Vec<PointWave>>> = points
         .par_chunks(PART)
         .enumerate()
         .map(|(part, points)| {
@@ -117,6 +117,7 @@ pub(crate) fn sources(points: &[PointSource]) -> Result<Vec<Source>> {
 
 /// What of the points' light the panel can send out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Coverage {
     /// Points in all.
     pub points: usize,
@@ -136,7 +137,7 @@ impl Coverage {
         let PointSum { optics, grid, sources, cull, .. } = *sum;
         let edges = grid.edges();
         let slopes = [0, 1].map(|axis| optics.cone(axis, 1.0));
-        let one = |source: &Source| {
+        let one = |source: &PointWave| {
             let power = source.amplitude * source.amplitude;
             let (mut part, mut pixels) = (1.0, 1.0);
             for (axis, position) in [source.x, source.y].into_iter().enumerate() {

@@ -19,7 +19,7 @@ const LEAST: f64 = 0.1;
 
 /// Where a panel's light goes at one wavelength.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cone {
+pub(super) struct Cone {
     /// Tangents of the band's ends along x and y.
     tangents: [[f64; 2]; 2],
     /// Half extent of the panel [m].
@@ -28,7 +28,7 @@ pub struct Cone {
 
 impl Cone {
     /// Of a field that leaves a panel centred on the axis, through the aperture of `settings` if there is one.
-    pub fn new(field: &Field, settings: &ViewSettings) -> Self {
+    pub(super) fn new(field: &Field, settings: &ViewSettings) -> Self {
         let (limit, grid) = ([field.grid.limit_x(), field.grid.limit_y()], &field.grid);
         let (center, band) = settings.aperture.map_or(([0.0; 2], limit), |a| (a.center, a.half));
         let tangent = |f: f64| (field.wavelength * f).clamp(-0.99, 0.99).asin().tan();
@@ -37,7 +37,7 @@ impl Cone {
     }
 
     /// Solid angle [sr] (for small angles) into which the point `at` of the plane z [m] sends its light through the panel.
-    pub fn solid_angle(&self, at: DVec2, z: f64) -> f64 {
+    pub(super) fn solid_angle(&self, at: DVec2, z: f64) -> f64 {
         let side = |i: usize, x: f64| {
             let [low, high] = self.tangents[i];
             if z == 0.0 {
@@ -51,7 +51,12 @@ impl Cone {
     }
 
     /// Divides a picture of the window ±half_at(z) by the solid angle of each pixel, seen at the depth z of `depth_of` it.
-    pub fn flatten(&self, picture: &mut Picture, half_at: impl Fn(f64) -> DVec2, depth_of: impl Fn(usize) -> f64) {
+    pub(super) fn flatten(
+        &self,
+        picture: &mut Picture,
+        half_at: impl Fn(f64) -> DVec2,
+        depth_of: impl Fn(usize) -> f64,
+    ) {
         let [[x0, x1], [y0, y1]] = self.tangents;
         let least = LEAST * (x1 - x0) * (y1 - y0);
         let size = DVec2::new(picture.width as f64, picture.height as f64);

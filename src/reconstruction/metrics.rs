@@ -58,6 +58,7 @@ fn blurred(values: &[f64], width: usize, height: usize) -> Vec<f64> {
 
 /// Figures of a reconstruction against the picture that it should show; all simulated.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Likeness {
     /// PSNR of the sRGB-coded pictures [dB].
     pub psnr: f64,

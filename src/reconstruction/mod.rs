@@ -4,16 +4,36 @@
 //! spectrum, forwards for z > 0, backwards for the virtual image behind the panel. An eye is a pupil: the field is
 //! carried to the pupil's plane, cut by it, and carried back to the plane that the eye focuses on, which is the image
 //! on the retina up to its scale, upright.
+//!
+//! ```
+//! use glam::{DVec2, DVec3};
+//! use holodrive::field::Grid;
+//! use holodrive::hologram::{HologramSettings, compute, plan};
+//! use holodrive::points::PointSource;
+//! use holodrive::progress::Progress;
+//! use holodrive::reconstruction::{View, ViewSettings, picture};
+//!
+//! // A point 5 cm behind the panel is seen at its place: cells are 20 µm, row 0 is on top.
+//! let panel = Grid::new(200, 200, 8e-6, 8e-6)?;
+//! let point = [PointSource { position: DVec3::new(2.1e-4, -1.1e-4, -0.05), amplitude: 1.0, phase: 0.0 }];
+//! let plan = plan(&point, &panel, 532e-9, &HologramSettings::default())?;
+//! let field = compute(&point, &panel, 532e-9, &plan, &Progress::new())?.field;
+//! let (view, half) = (View::Plane { z: -0.05 }, DVec2::splat(5e-4));
+//! let seen = picture(&field, &view, half, (50, 50), &ViewSettings::default(), &Progress::new())?;
+//! let brightest = (0..2500).max_by(|&a, &b| seen.values[a].total_cmp(&seen.values[b]));
+//! assert_eq!(brightest, Some(30 * 50 + 35));
+//! # Ok::<(), holodrive::Error>(())
+//! ```
 
 pub mod colour;
-pub mod flat_field;
+mod flat_field;
 mod light;
 pub mod metrics;
 pub mod orders;
 mod picture;
 
 pub use colour::ColorPicture;
-pub use flat_field::Cone;
+use flat_field::Cone;
 pub use light::{ExposureLight, Light, Reconstruction};
 pub use orders::{Orders, orders};
 pub use picture::{Picture, Scale, read_gray, write_coded_png, write_rgb_png};

@@ -91,19 +91,6 @@ impl Picture {
         self.values.iter().map(|v| srgb_from_linear((v * gain).clamp(0.0, 1.0))).collect()
     }
 
-    /// Mean absolute difference of neighbouring values over the mean value: grows with sharpness, blind to gain.
-    pub fn sharpness(&self, columns: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> f64 {
-        let at = |c: usize, r: usize| f64::from(self.values[r * self.width + c]);
-        let (mut difference, mut sum) = (0.0, 0.0);
-        for r in rows.start..rows.end.saturating_sub(1).min(self.height - 1) {
-            for c in columns.start..columns.end.saturating_sub(1).min(self.width - 1) {
-                difference += (at(c + 1, r) - at(c, r)).powi(2) + (at(c, r + 1) - at(c, r)).powi(2);
-                sum += at(c, r).powi(2);
-            }
-        }
-        if sum > 0.0 { (difference / sum).sqrt() } else { 0.0 }
-    }
-
     /// Writes the picture as an sRGB-coded 8-bit gray PNG with text chunks (keyword, text).
     pub fn write_png(&self, path: &Path, scale: Scale, texts: &[(&str, String)]) -> Result<()> {
         let bytes: Vec<u8> = self.coded(scale).iter().map(|v| (v * 255.0).round() as u8).collect();
@@ -163,15 +150,12 @@ fn write_png(
 /// [`Error::Input`] for a file that is no picture, or one of more than 2²⁸ pixels.
 pub fn read_gray(path: &Path) -> Result<(usize, usize, Vec<f32>)> {
     let refused = |e: image::ImageError| Error::input(path, format!("not a readable picture: {e}"));
-    let reader =
-        image::ImageReader::open(path).map_err(Error::io(path))?.with_guessed_format().map_err(Error::io(path))?;
-    let (width, height) = reader.into_dimensions().map_err(refused)?;
+    let open = || image::ImageReader::open(path)?.with_guessed_format();
+    let (width, height) = open().map_err(Error::io(path))?.into_dimensions().map_err(refused)?;
     if u64::from(width) * u64::from(height) > 1 << 28 {
         return Err(Error::input(path, format!("{width}×{height} pixels are too many")));
     }
-    let reader =
-        image::ImageReader::open(path).map_err(Error::io(path))?.with_guessed_format().map_err(Error::io(path))?;
-    let gray = reader.decode().map_err(refused)?.into_luma16();
+    let gray = open().map_err(Error::io(path))?.decode().map_err(refused)?.into_luma16();
     let values = gray.into_raw().into_iter().map(|v| f32::from(v) / 65535.0).collect();
     Ok((width as usize, height as usize, values))
 }

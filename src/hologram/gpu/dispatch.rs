@@ -2,7 +2,7 @@
 
 use super::device::Device;
 use super::record::{Readback, Recorder, group, storage, uniform};
-use super::{Band, CELL, Constants, Point, Set, WAVE};
+use super::{Band, CELL, ClassOnDevice, Constants, Point, WAVE};
 use crate::error::Result;
 use crate::progress::Progress;
 use pixels::wgpu;
@@ -45,7 +45,7 @@ impl<'a> Engine<'a> {
     }
 
     /// Adds a set to the band: cells are prepared on the CPU while those before are summed.
-    pub(super) fn sum(&mut self, band: &Band, set: &Set, progress: &Progress) -> Result<()> {
+    pub(super) fn sum(&mut self, band: &Band, set: &ClassOnDevice, progress: &Progress) -> Result<()> {
         let constants = Constants { width: band.grid.width as u32, height: band.rows as u32, ..set.constants };
         self.device.queue.write_buffer(&self.constants, 0, bytemuck::bytes_of(&constants));
         let pipeline = &self.device.pipelines[set.pipeline];

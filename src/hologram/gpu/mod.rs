@@ -23,7 +23,7 @@ mod strokes;
 
 use super::Cull;
 use super::definition::Optics;
-use super::sources::{PointSum, Source};
+use super::sources::{PointSum, PointWave};
 use super::tiles::{Axis, Class, EdgeTable, Kernel, Limit, Products};
 use crate::error::Result;
 use crate::field::{Field, Grid};
@@ -88,7 +88,7 @@ pub(crate) fn adapter() -> Result<&'static str> {
 pub(crate) fn bytes(grid: &Grid, points: usize) -> u64 {
     let wave = WAVE.max((size_of::<Point>() * points) as u64);
     let band = BAND.min(8 * grid.len() as u64).max(8 * grid.width as u64);
-    2 * wave + 2 * (CHUNK.min(points) * size_of::<Point>()) as u64 + 2 * band + (size_of::<Source>() * points) as u64
+    2 * wave + 2 * (CHUNK.min(points) * size_of::<Point>()) as u64 + 2 * band + (size_of::<PointWave>() * points) as u64
 }
 
 /// Predicted wall time of point–pixel pairs [s]; `None` without an adapter, or with one that is the CPU itself.
@@ -105,7 +105,7 @@ pub(crate) fn seconds(pairs: f64) -> Option<f64> {
 fn measured_rate(device: &Device) -> Result<f64> {
     let grid = Grid::new(2048, 2048, 8e-6, 8e-6)?;
     let optics = Optics::new(&grid, 633e-9)?;
-    let source = Source { x: 0.0, y: 0.0, distance: 0.3, sign: 1.0, amplitude: 1.0, turns: 0.0 };
+    let source = PointWave { x: 0.0, y: 0.0, distance: 0.3, sign: 1.0, amplitude: 1.0, turns: 0.0 };
     let sources = vec![source; 1024];
     let indexes: Vec<usize> = (0..sources.len()).collect();
     let progress = &Progress::new();
@@ -135,7 +135,7 @@ fn add_with(device: &Device, field: &mut Field, sum: &PointSum, classes: &[Class
     let limits = device.device.limits();
     let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(BAND);
     let rows = ((binding / (8 * grid.width as u64)) as usize).clamp(1, grid.height);
-    let sets: Vec<Set> = classes.iter().map(|class| Set::new(device, sum, class)).collect();
+    let sets: Vec<ClassOnDevice> = classes.iter().map(|class| ClassOnDevice::new(device, sum, class)).collect();
     progress.check()?;
     let mut engine = Engine::new(device, grid.width * rows);
     let mut behind: Option<(usize, Readback)> = None;
@@ -172,7 +172,7 @@ impl Band<'_> {
     }
 
     /// The members that light a cell.
-    fn points(&self, set: &Set, [column, row]: [usize; 2]) -> Vec<Point> {
+    fn points(&self, set: &ClassOnDevice, [column, row]: [usize; 2]) -> Vec<Point> {
         let [x, y] = self.grid.middle([column, self.first + row], [CELL; 2]);
         let half = self.grid.pitch().map(|pitch| 0.5 * CELL as f64 * pitch);
         let mut points = Vec::new();
@@ -201,8 +201,8 @@ impl Band<'_> {
 }
 
 /// A class of points with what the shader needs for it.
-struct Set {
-    members: Vec<Source>,
+struct ClassOnDevice {
+    members: Vec<PointWave>,
     /// Half width of the cone per metre of distance.
     tangent: [f64; 2],
     /// Index of the pipeline.
@@ -212,7 +212,7 @@ struct Set {
     constants: Constants,
 }
 
-impl Set {
+impl ClassOnDevice {
     fn new(device: &Device, sum: &PointSum, class: &Class) -> Self {
         let (optics, cull) = (sum.optics, sum.cull);
         let table = class.edges(sum);

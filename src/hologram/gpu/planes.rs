@@ -18,8 +18,10 @@ use crate::error::{Error, Result};
 use crate::field::{Field, Grid};
 use crate::hologram::definition::Optics;
 use crate::hologram::dispersion::{Dispersion, reduced};
-use crate::hologram::planes::{Cloud, Layout, Parameters, Slabs, Splat, Table, carrier, layout_of, mean_square, splat};
-use crate::hologram::sources::Source;
+use crate::hologram::planes::{
+    Cloud, Parameters, PlaneGrid, Slabs, Splat, Table, carrier, layout_of, mean_square, splat,
+};
+use crate::hologram::sources::PointWave;
 use crate::progress::Progress;
 use pixels::wgpu;
 use rayon::prelude::*;
@@ -45,7 +47,7 @@ pub(crate) struct Cost {
 }
 
 /// The planes, and the grid of transforms whose lengths have the factors 2, 3 and 5 only.
-fn arrangement(cloud: &Cloud, parameters: &Parameters) -> (Slabs, Layout) {
+fn arrangement(cloud: &Cloud, parameters: &Parameters) -> (Slabs, PlaneGrid) {
     let slabs = parameters.slabs(cloud);
     let layout = layout_of(cloud, parameters, &slabs, &[1]);
     (slabs, layout)
@@ -79,7 +81,7 @@ pub(crate) fn cost(cloud: &Cloud, parameters: &Parameters) -> Result<Cost> {
     }
     let count = cloud.sources.len();
     let chunk = count.min(STROKES);
-    let own = size_of::<Source>() + size_of::<Splat>() + size_of::<[[u32; 2]; 2]>();
+    let own = size_of::<PointWave>() + size_of::<Splat>() + size_of::<[[u32; 2]; 2]>();
     // Strokes and lists stand on the host, wait there to be copied, and on the device; tables on both sides.
     let host = count * own + 2 * (chunk * size_of::<Stroke>() + 4 * ENTRIES) + 8 * grid.len();
     let on_device = (parameters.rank as u64 + 2) * 8 * samples + (STROKES * size_of::<Stroke>() + 4 * ENTRIES) as u64;
@@ -161,7 +163,7 @@ struct Moment {
 /// Everything on the device.
 struct Engine<'a> {
     optics: &'a Optics,
-    layout: Layout,
+    layout: PlaneGrid,
     /// a and b, λ²f², by column and row of the transforms.
     dispersion: Dispersion,
     paint: Paint,
@@ -179,7 +181,7 @@ struct Engine<'a> {
 
 impl<'a> Engine<'a> {
     /// `half` is the slabs' half depth [m].
-    fn new(device: &Device, cloud: &'a Cloud, layout: Layout, tables: [&Table; 2], half: f64, rank: usize) -> Self {
+    fn new(device: &Device, cloud: &'a Cloud, layout: PlaneGrid, tables: [&Table; 2], half: f64, rank: usize) -> Self {
         let [width, height] = layout.size;
         let optics = cloud.optics;
         let lambda = optics.wavelength;
@@ -361,8 +363,8 @@ pub(crate) fn field(cloud: &Cloud, parameters: &Parameters, progress: &Progress)
     let mut before = None;
     for k in 0..slabs.depths.len() {
         let middle = slabs.plane(k);
-        let is_here = |s: &&Source| slabs.index(s.sign * s.distance) == k;
-        let to_splat = |s: &Source| splat(cloud, &layout, carrier, s, middle);
+        let is_here = |s: &&PointWave| slabs.index(s.sign * s.distance) == k;
+        let to_splat = |s: &PointWave| splat(cloud, &layout, carrier, s, middle);
         let splats: Vec<Splat> = sources.par_iter().filter(is_here).map(to_splat).collect();
         let spans: Vec<_> = splats.par_iter().map(|splat| span(splat, slope, parameters.tail, tiles)).collect();
         // What is written waits in memory until the device has done what came before it.

@@ -1,6 +1,6 @@
 //! Points as the shader paints them, and the lists of those that touch each tile.
 
-use crate::hologram::planes::{Layout, Splat, Table};
+use crate::hologram::planes::{PlaneGrid, Splat, Table};
 
 /// Side of a tile [px]; as in the shader.
 const TILE: usize = 64;
@@ -44,7 +44,7 @@ impl Stroke {
 }
 
 /// Tiles of a plane, along x and y.
-pub(super) fn tiles(layout: &Layout) -> [usize; 2] {
+pub(super) fn tiles(layout: &PlaneGrid) -> [usize; 2] {
     [layout.size[0].div_ceil(TILE), layout.painted.div_ceil(TILE)]
 }
 

@@ -53,7 +53,7 @@ impl Buffers {
 
 /// What leaves a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Light {
+pub(super) enum Emission {
     /// A field.
     Field,
     /// Amplitudes of points: their field has the factor ±i·W·W/f_z, + where the points stand behind the panel.
@@ -65,7 +65,7 @@ pub(super) enum Light {
 
 /// The factor of a distance: exp(i2πf_z·d) onto the window, times that of the light.
 pub(super) struct Factor {
-    light: Light,
+    light: Emission,
     ratio: f32,
     /// Phase modulo one turn and gain, by column; without gain the column is dark.
     columns: Vec<[f32; 2]>,
@@ -113,20 +113,20 @@ impl Leg {
     }
 
     /// The factor for light over a distance [m] onto a window.
-    pub(super) fn factor(&self, light: Light, distance: f64, to: Window) -> Factor {
+    pub(super) fn factor(&self, light: Emission, distance: f64, to: Window) -> Factor {
         let (grid, ratio) = (&self.grid, distance / self.optics.wavelength);
         // 1/N of the inverse transform. A sample of points' transform stands for the lattice's cell of frequencies, and
         // its sum is 1/N of the integral; 1/f_z = λ/√(1 − a − b).
         let scale = 1.0 / grid.len() as f64;
         let (scale, quarter) = match light {
-            Light::Field => (scale, 0.0),
-            Light::Points { behind } => {
+            Emission::Field => (scale, 0.0),
+            Emission::Points { behind } => {
                 let area = 1.0 / (grid.pitch_x * grid.pitch_y);
                 (scale * area * self.optics.wavelength, if behind { 0.25 } else { -0.25 })
             }
         };
         let weight = |axis: usize, k: usize, f: f64| {
-            let taper = if light == Light::Field { 1.0 } else { self.tapers[axis][k] };
+            let taper = if light == Emission::Field { 1.0 } else { self.tapers[axis][k] };
             taper * to.weight(&self.optics, axis, f, distance)
         };
         let column = |k: usize| {
@@ -180,7 +180,8 @@ impl Leg {
         buffers: &mut Buffers,
         lattice: &Grid,
         factor: &Factor,
-        [first, last]: [bool; 2],
+        first: bool,
+        last: bool,
         progress: &Progress,
     ) {
         let [width, height] = self.size();
@@ -336,7 +337,7 @@ unsafe fn multiply<L: Lanes>(
     let count = sum.len();
     let lengths = [squares.len(), roots.len(), phases.len(), gains.len(), from.len()];
     assert!(count.is_multiple_of(16) && lengths.iter().all(|&n| n >= count));
-    let points = factor.light != Light::Field;
+    let points = factor.light != Emission::Field;
     let mut k = 0;
     // SAFETY: lengths were checked, and are multiples of every lane count.
     unsafe {

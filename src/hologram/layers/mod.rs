@@ -23,7 +23,7 @@ use super::lanes::InstructionSet;
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Field, Grid};
 use crate::progress::Progress;
-use leg::{Buffers, Leg, Light};
+use leg::{Buffers, Emission, Leg};
 pub use slices::{SliceSettings, of_slices};
 use window::Window;
 
@@ -36,55 +36,6 @@ pub struct Layer {
     pub light: Vec<Complex32>,
     /// Samples that let nothing through from behind; none where empty.
     pub opaque: Vec<bool>,
-}
-
-/// Cuts a picture with depth into layers: amplitudes, phases [rad] and depths z [m] of each sample, on a lattice.
-///
-/// Planes stand evenly from the smallest depth to the largest, each sample goes to the nearest one and keeps its phase:
-/// its depth is off by up to half their distance. A sample with light hides what is behind it where `occlude`.
-///
-/// # Errors
-/// [`Error::Parameter`] for arrays of unequal length, numbers that are not finite, or no planes.
-pub fn slice(amplitudes: &[f32], phases: &[f64], depths: &[f64], planes: usize, occlude: bool) -> Result<Vec<Layer>> {
-    let count = amplitudes.len();
-    if phases.len() != count || depths.len() != count {
-        let what = format!("{count} amplitudes, {} phases and {} depths", phases.len(), depths.len());
-        return Err(Error::parameter("layers", what));
-    }
-    if planes == 0 {
-        return Err(Error::parameter("planes", "at least one is needed"));
-    }
-    if let Some(i) =
-        (0..count).find(|&i| !(amplitudes[i].is_finite() && phases[i].is_finite() && depths[i].is_finite()))
-    {
-        let what = format!("sample {i}: {}, {} rad, {} m must be finite", amplitudes[i], phases[i], depths[i]);
-        return Err(Error::parameter("layers", what));
-    }
-    let lit = || (0..count).filter(|&i| amplitudes[i] != 0.0);
-    let (low, high) =
-        lit().map(|i| depths[i]).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
-    if low > high {
-        return Ok(Vec::new());
-    }
-    let step = if planes > 1 { (high - low) / (planes - 1) as f64 } else { 0.0 };
-    let nearest = |z: f64| if step > 0.0 { ((z - low) / step).round() as usize } else { 0 };
-    let middle = if planes > 1 { low } else { 0.5 * (low + high) };
-    let dark = |k: usize| Layer {
-        z: middle + k as f64 * step,
-        light: vec![Complex32::default(); count],
-        opaque: if occlude { vec![false; count] } else { Vec::new() },
-    };
-    let mut layers: Vec<Layer> = (0..planes).map(dark).collect();
-    for i in lit() {
-        let layer = &mut layers[nearest(depths[i]).min(planes - 1)];
-        let (sin, cos) = phases[i].sin_cos();
-        layer.light[i] = Complex32::new(amplitudes[i] * cos as f32, amplitudes[i] * sin as f32);
-        if occlude {
-            layer.opaque[i] = true;
-        }
-    }
-    layers.retain(|layer| layer.light.iter().any(|u| u.norm_sqr() > 0.0));
-    Ok(layers)
 }
 
 /// Memory that [`compute`] takes at most beside layers and field [bytes]: the transformed rows of a layer, a padded
@@ -166,16 +117,16 @@ pub fn compute(
         if let Some(carried) = &carried {
             carried.shutter(&mut buffers, lattice, &stretch[0].opaque, &leg, progress);
             progress.check()?;
-            let factor = leg.factor(Light::Field, to - stretch[0].z, window);
-            leg.add(&mut buffers, lattice, &factor, [true, parts == 1], progress);
+            let factor = leg.factor(Emission::Field, to - stretch[0].z, window);
+            leg.add(&mut buffers, lattice, &factor, true, parts == 1, progress);
             progress.check()?;
         }
         for (k, layer) in lit.iter().enumerate() {
             leg.emit(&mut buffers, lattice, &layer.light, progress);
             progress.check()?;
-            let factor = leg.factor(Light::Points { behind: layer.z <= 0.0 }, to - layer.z, window);
-            let ends = [k == 0 && carried.is_none(), k + 1 == lit.len()];
-            leg.add(&mut buffers, lattice, &factor, ends, progress);
+            let factor = leg.factor(Emission::Points { behind: layer.z <= 0.0 }, to - layer.z, window);
+            let (first, last) = (k == 0 && carried.is_none(), k + 1 == lit.len());
+            leg.add(&mut buffers, lattice, &factor, first, last, progress);
             progress.check()?;
             progress.advance(1);
         }

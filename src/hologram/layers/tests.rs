@@ -79,17 +79,13 @@ fn an_opaque_layer_hides_what_is_behind_it_and_nothing_else() {
 }
 
 #[test]
-fn pictures_are_sliced_and_nonsense_is_refused() {
-    let amplitudes = [1.0, 0.0, 2.0, 1.0];
-    let layers = slice(&amplitudes, &[0.0; 4], &[-0.1, -9.0, -0.3, -0.19], 3, true).expect("layers");
-    assert_eq!(layers.iter().map(|l| (l.z * 1e3).round()).collect::<Vec<_>>(), [-300.0, -200.0, -100.0]);
-    assert!(layers[1].opaque == [false, false, false, true] && layers[0].light[2].re == 2.0);
-    assert!(slice(&amplitudes, &[0.0; 3], &[0.0; 4], 3, true).is_err());
-    assert!(slice(&amplitudes, &[0.0; 4], &[f64::NAN; 4], 3, true).is_err());
+fn nonsense_is_refused() {
+    let layers = [Layer { z: -0.1, light: vec![Complex32::new(1.0, 0.0); 4], opaque: Vec::new() }];
     let grid = Grid::new(2, 2, 8e-6, 8e-6).expect("grid");
     let run = |layers: &[Layer], memory| compute(layers, &grid, &grid, WAVELENGTH, memory, &Progress::new());
     assert!(matches!(run(&layers, 100), Err(Error::Memory { .. })));
     assert!(run(&[Layer { z: f64::NAN, ..layers[0].clone() }], 1 << 20).is_err());
+    assert!(run(&[Layer { opaque: vec![true; 3], ..layers[0].clone() }], 1 << 20).is_err());
     let stopped = Progress::new();
     stopped.stop();
     assert!(matches!(compute(&layers, &grid, &grid, WAVELENGTH, 1 << 20, &stopped), Err(Error::Interrupted)));
@@ -99,7 +95,7 @@ fn pictures_are_sliced_and_nonsense_is_refused() {
 fn plain(
     optics: &Optics,
     grid: &Grid,
-    light: Light,
+    light: Emission,
     distance: f64,
     shift: [f64; 2],
     [kx, ky]: [usize; 2],
@@ -109,8 +105,8 @@ fn plain(
     let turns = fz * distance + fx * shift[0] + fy * shift[1];
     let carried = Complex64::cis(TAU * (turns - turns.round()));
     match light {
-        Light::Field => carried,
-        Light::Points { behind } => {
+        Emission::Field => carried,
+        Emission::Points { behind } => {
             let weight = optics.taper[0].at(fx) * optics.taper[1].at(fy) / fz / (grid.pitch_x * grid.pitch_y);
             carried * Complex64::new(0.0, if behind { 1.0 } else { -1.0 }) * weight
         }
@@ -136,7 +132,7 @@ fn fast_factors_equal_those_in_double_precision() {
         for to in [half, aside] {
             let window = Window::new(&half, &to);
             let shift = [to.x(0) - half.x(0), to.y(0) - half.y(0)];
-            for light in [Light::Field, Light::Points { behind: true }, Light::Points { behind: false }] {
+            for light in [Emission::Field, Emission::Points { behind: true }, Emission::Points { behind: false }] {
                 for set in InstructionSet::available() {
                     let leg = Leg::new(&optics, size, set).expect("leg");
                     let factor = leg.factor(light, distance, window);
@@ -186,13 +182,13 @@ fn chain(layers: &[Layer], lattice: &Grid, panel: &Grid, [width, height]: [usize
     order.sort_by(|a, b| a.z.total_cmp(&b.z));
     let mut sum = vec![Complex64::default(); grid.len()];
     let mut at = order[0].z;
-    let times = |sum: &mut [Complex64], light: Light, distance: f64, shift: [f64; 2]| {
+    let times = |sum: &mut [Complex64], light: Emission, distance: f64, shift: [f64; 2]| {
         sum.par_iter_mut().enumerate().for_each(|(i, u)| {
             *u *= plain(&optics, &grid, light, distance, shift, [i % grid.width, i / grid.width]);
         });
     };
     for layer in order {
-        times(&mut sum, Light::Field, layer.z - at, [0.0; 2]);
+        times(&mut sum, Emission::Field, layer.z - at, [0.0; 2]);
         at = layer.z;
         if layer.opaque.contains(&true) {
             transform.inverse(&mut sum, &progress);
@@ -209,10 +205,10 @@ fn chain(layers: &[Layer], lattice: &Grid, panel: &Grid, [width, height]: [usize
         };
         let mut own: Vec<Complex64> = (0..grid.len()).map(value).collect();
         transform.forward(&mut own, &progress);
-        times(&mut own, Light::Points { behind: layer.z <= 0.0 }, 0.0, [0.0; 2]);
+        times(&mut own, Emission::Points { behind: layer.z <= 0.0 }, 0.0, [0.0; 2]);
         sum.iter_mut().zip(&own).for_each(|(sum, u)| *sum += u);
     }
-    times(&mut sum, Light::Field, -at, [panel.x(0) - lattice.x(0), panel.y(0) - lattice.y(0)]);
+    times(&mut sum, Emission::Field, -at, [panel.x(0) - lattice.x(0), panel.y(0) - lattice.y(0)]);
     transform.inverse(&mut sum, &progress);
     (0..panel.len()).map(|i| sum[i / panel.width * grid.width + i % panel.width]).collect()
 }

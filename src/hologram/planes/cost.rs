@@ -8,7 +8,7 @@ use super::paint::{self, GROUP};
 use super::spectrum::Spectrum;
 use super::table::Table;
 use super::{Cloud, Parameters, Slabs, Splat};
-use crate::hologram::sources::Source;
+use crate::hologram::sources::PointWave;
 
 /// A pixel's part in a column: its factors once a plane, its transform and the sum once a moment [core-seconds].
 const FACTORS: f64 = 7.5e-10;
@@ -109,7 +109,7 @@ impl Parameters {
         let half = [0, 1].map(|axis| Table::half_width(cloud.optics, axis, slabs.half, self.tail));
         let tables: u64 = self.table_bytes(cloud.optics, slabs.half).iter().sum();
         let points =
-            cloud.sources.len() as u64 * (size_of::<Source>() + size_of::<Splat>() + paint::ORDER_BYTES + 8) as u64;
+            cloud.sources.len() as u64 * (size_of::<PointWave>() + size_of::<Splat>() + paint::ORDER_BYTES + 8) as u64;
         plane + Spectrum::bytes(&layout, self.rank) + paint::bytes(half, self.rank) + tables + points
     }
 }

@@ -19,7 +19,7 @@ mod table;
 
 use super::definition::Optics;
 use super::lanes::InstructionSet;
-use super::sources::{Source, tilt};
+use super::sources::{PointWave, tilt};
 use crate::error::Result;
 use crate::field::{Complex32, Field, Grid, fast_length, zeroed};
 use crate::progress::Progress;
@@ -32,7 +32,7 @@ use std::sync::Arc;
 
 pub(in crate::hologram) use paint::Splat;
 pub(in crate::hologram) use slabs::Slabs;
-pub(in crate::hologram) use spectrum::Layout;
+pub(in crate::hologram) use spectrum::PlaneGrid;
 pub(in crate::hologram) use table::{Fineness, Table, mean_square};
 
 /// How the planes are laid.
@@ -67,7 +67,7 @@ pub(crate) struct Cloud<'a> {
     /// The panel.
     pub(in crate::hologram) grid: &'a Grid,
     /// The sources whose light meets the panel; copied only where some do not.
-    pub(in crate::hologram) sources: Cow<'a, [Source]>,
+    pub(in crate::hologram) sources: Cow<'a, [PointWave]>,
     /// Light by signed distance ζ = −z: it runs from −ζ to the panel at 0 [m].
     depths: Depths,
     /// Lowest and highest panel column, and row.
@@ -80,9 +80,9 @@ pub(crate) struct Cloud<'a> {
 
 impl<'a> Cloud<'a> {
     /// Gathers the sources whose light meets the panel.
-    pub(crate) fn new(optics: &'a Optics, grid: &'a Grid, sources: &'a [Source]) -> Self {
+    pub(crate) fn new(optics: &'a Optics, grid: &'a Grid, sources: &'a [PointWave]) -> Self {
         let slopes = [0, 1].map(|axis| reach(optics, axis, 1.0));
-        let meets = |s: &Source| {
+        let meets = |s: &PointWave| {
             let spans = s.span(grid);
             (0..2).all(|axis| {
                 let reach = slopes[axis] * s.distance + 64.0 * optics.pitch[axis];
@@ -96,7 +96,7 @@ impl<'a> Cloud<'a> {
         };
         let pixels = [grid.width as f64, grid.height as f64];
         // Lowest and highest place, and period, of each axis: whatever the order, the same.
-        let one = |s: &Source| {
+        let one = |s: &PointWave| {
             let at = [grid.column(s.x), grid.row(s.y)];
             [0, 1].map(|axis| {
                 // An alias, one period away, must lie beyond the point's reach from the farthest pixel.
@@ -217,7 +217,7 @@ fn reach(optics: &Optics, axis: usize, distance: f64) -> f64 {
 }
 
 /// The periodic grid: large enough that no point's light comes round onto the panel.
-fn layout(cloud: &Cloud, parameters: &Parameters, slabs: &Slabs) -> Layout {
+fn layout(cloud: &Cloud, parameters: &Parameters, slabs: &Slabs) -> PlaneGrid {
     layout_of(cloud, parameters, slabs, &[1, 7, 11])
 }
 
@@ -227,9 +227,9 @@ pub(in crate::hologram) fn layout_of(
     parameters: &Parameters,
     slabs: &Slabs,
     others: &[usize],
-) -> Layout {
+) -> PlaneGrid {
     let (optics, grid, h) = (cloud.optics, cloud.grid, slabs.half);
-    let mut layout = Layout { size: [0; 2], painted: 0, origin: [0; 2] };
+    let mut layout = PlaneGrid { size: [0; 2], painted: 0, origin: [0; 2] };
     for (axis, pixels) in [grid.width as f64, grid.height as f64].into_iter().enumerate() {
         let halo = Table::half_width(optics, axis, h, parameters.tail) as f64 + 18.0;
         let [low, high] = cloud.places[axis];
@@ -255,7 +255,7 @@ pub(in crate::hologram) fn carrier(optics: &Optics, tables: [&Table; 2]) -> f64 
 }
 
 /// A source relative to the plane at the signed distance `middle` [m].
-pub(in crate::hologram) fn splat(cloud: &Cloud, layout: &Layout, carrier: f64, s: &Source, middle: f64) -> Splat {
+pub(in crate::hologram) fn splat(cloud: &Cloud, layout: &PlaneGrid, carrier: f64, s: &PointWave, middle: f64) -> Splat {
     let (optics, grid) = (cloud.optics, cloud.grid);
     let d = s.sign * s.distance - middle;
     let turns = d * carrier + s.turns + 0.25 * s.sign;

@@ -163,16 +163,10 @@ fn reach(brush: &Brush, axis: usize, d: f64) -> f64 {
     d.abs() * brush.slope[axis] + brush.tail
 }
 
-fn paint_bin(
-    patch: &mut Patch,
-    brush: &Brush,
-    splats: &[Splat],
-    bin: &[u32],
-    set: InstructionSet,
-    progress: &Progress,
-) {
+/// First pixel of the splats' kernels, and the one behind their last, along each axis.
+fn span(brush: &Brush, splats: &[Splat], members: &[u32]) -> [[usize; 2]; 2] {
     let mut span = [[usize::MAX, 0]; 2];
-    for &i in bin {
+    for &i in members {
         let splat = &splats[i as usize];
         for (axis, span) in span.iter_mut().enumerate() {
             let reach = reach(brush, axis, splat.d);
@@ -181,6 +175,18 @@ fn paint_bin(
             *span = [span[0].min(first), span[1].max(last)];
         }
     }
+    span
+}
+
+fn paint_bin(
+    patch: &mut Patch,
+    brush: &Brush,
+    splats: &[Splat],
+    bin: &[u32],
+    set: InstructionSet,
+    progress: &Progress,
+) {
+    let span = span(brush, splats, bin);
     patch.first = [span[0][0], span[1][0]];
     patch.width = (span[0][1] - span[0][0]).next_multiple_of(16);
     patch.height = span[1][1] - span[1][0];
@@ -211,16 +217,8 @@ unsafe fn paint_groups<L: Lanes>(patch: &mut Patch, brush: &Brush, splats: &[Spl
         if progress.stopped() {
             return;
         }
-        let (mut span_x, mut span_y) = ([usize::MAX, 0], [usize::MAX, 0]);
-        for &i in group {
-            let splat = &splats[i as usize];
-            for (axis, span) in [(0, &mut span_x), (1, &mut span_y)] {
-                let reach = reach(brush, axis, splat.d);
-                let first = ((splat.at[axis] - reach).max(0.0) as usize).saturating_sub(patch.first[axis]);
-                let last = (splat.at[axis] + reach) as usize + 2 - patch.first[axis];
-                *span = [span[0].min(first), span[1].max(last)];
-            }
-        }
+        let own = span(brush, splats, group);
+        let [span_x, span_y] = [0, 1].map(|axis| own[axis].map(|at| at - patch.first[axis]));
         // Whole vectors, from an aligned one: the patch's width is a multiple of sixteen.
         let first = span_x[0] / L::COUNT * L::COUNT;
         let columns = (span_x[1].min(width) - first).next_multiple_of(L::COUNT);

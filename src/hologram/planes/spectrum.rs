@@ -30,7 +30,7 @@ const GAP: usize = 16;
 
 /// The periodic grid of the planes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::hologram) struct Layout {
+pub(in crate::hologram) struct PlaneGrid {
     /// Columns and rows of the transforms, multiples of 16.
     pub(in crate::hologram) size: [usize; 2],
     /// Rows that can be painted; those below are dark.
@@ -39,7 +39,7 @@ pub(in crate::hologram) struct Layout {
     pub(in crate::hologram) origin: [i64; 2],
 }
 
-impl Layout {
+impl PlaneGrid {
     /// The grid of the transforms.
     pub(in crate::hologram) fn grid(&self, optics: &Optics) -> Grid {
         let ([width, height], [pitch_x, pitch_y]) = (self.size, optics.pitch);
@@ -71,7 +71,7 @@ struct ColumnFactor<'a> {
 
 /// What the columns share.
 struct Shared {
-    layout: Layout,
+    layout: PlaneGrid,
     /// Where the taper is dark: largest λ²f² along each axis.
     limit: [f64; 2],
     dispersion: Dispersion,
@@ -96,7 +96,7 @@ pub(super) struct Spectrum {
 
 impl Spectrum {
     /// A dark one; `depth` is h [m].
-    pub(super) fn new(optics: &Optics, layout: &Layout, depth: f64, set: InstructionSet) -> Self {
+    pub(super) fn new(optics: &Optics, layout: &PlaneGrid, depth: f64, set: InstructionSet) -> Self {
         let [width, height] = layout.size;
         let lambda = optics.wavelength;
         let shared = Shared {
@@ -112,7 +112,7 @@ impl Spectrum {
     }
 
     /// Memory of the spectrum and of the threads that work on it [bytes].
-    pub(super) fn bytes(layout: &Layout, rank: usize) -> u64 {
+    pub(super) fn bytes(layout: &PlaneGrid, rank: usize) -> u64 {
         let [width, height] = layout.size;
         let column = height + GAP;
         // Of each thread: columns of each moment with the transform's scratch, C and amplitude, or rows on the way back.
@@ -222,7 +222,7 @@ impl Strip {
 
     /// Transforms columns `first`… of a plane's moments and adds them to those of the spectrum.
     fn add(&mut self, first: usize, shared: &Shared, plane: &Plane, sum: &mut [Complex32]) {
-        let Layout { size: [width, height], painted, .. } = shared.layout;
+        let PlaneGrid { size: [width, height], painted, .. } = shared.layout;
         let stride = height + GAP;
         // Beyond its taper a column is dark, and its residual phase without bound.
         let lit: [bool; STRIP] = std::array::from_fn(|i| shared.dispersion.columns[first + i] <= shared.limit[0]);

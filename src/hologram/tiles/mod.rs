@@ -32,7 +32,7 @@ use super::definition::Optics;
 #[cfg(target_arch = "x86_64")]
 use super::lanes::matrix::Amx;
 use super::lanes::{InstructionSet, dispatch};
-use super::sources::{PointSum, Source, contrast, tilt};
+use super::sources::{PointSum, PointWave, contrast, tilt};
 use crate::error::Result;
 use crate::field::{Complex32, Field};
 use factor::{Relative, Tile};
@@ -72,14 +72,14 @@ impl Class {
         } else {
             0
         };
-        WAVE as u64 * tile + table + (size_of::<Source>() * self.sources.len()) as u64
+        WAVE as u64 * tile + table + (size_of::<PointWave>() * self.sources.len()) as u64
     }
     /// Predicted work on AVX-512 [core-seconds]: that of each point on each tile that its cone touches.
     pub(crate) fn core_seconds(&self, sum: &PointSum) -> f64 {
         let PointSum { optics, grid, sources, cull, .. } = *sum;
         let (width, height) = (self.shape.width as f64, self.shape.height as f64);
         let tile = self.shape.seconds();
-        let count = |source: &Source| {
+        let count = |source: &PointWave| {
             let spans = source.span(grid);
             let tiles = |axis: usize, size: f64| {
                 let pitch = optics.pitch[axis];
@@ -101,7 +101,7 @@ impl Class {
         self.distance[0]
     }
     /// The class's sources, in the order of their x.
-    pub(crate) fn members(&self, sources: &[Source]) -> Vec<Source> {
+    pub(crate) fn members(&self, sources: &[PointWave]) -> Vec<PointWave> {
         self.sources.par_iter().map(|&i| sources[i]).collect()
     }
     /// The taper's table for the class's distances; empty where waves are not tapered, dark when asked to stop.
@@ -170,8 +170,8 @@ pub(crate) fn classify(sum: &PointSum, indexes: &[usize], products: Products, er
                 Cull::Hard => optics.wavelength * optics.taper[axis].limit,
                 Cull::None => 1.0,
             });
-            let chosen: Vec<Source> = members.par_iter().map(|&i| sources[i]).collect();
-            let widest = |source: &Source| {
+            let chosen: Vec<PointWave> = members.par_iter().map(|&i| sources[i]).collect();
+            let widest = |source: &PointWave| {
                 let sine = source.sines(grid, limit).map(|[low, high]| low.abs().max(high.abs()));
                 ([source.distance; 2], sine)
             };
