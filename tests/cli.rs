@@ -161,7 +161,7 @@ fn bad_profiles_and_flags_end_in_one_line() {
     refused(f, &["compute", "p.ply", "--error", "nan"], "error");
     refused(f, &["points", &scene("cornell.gltf"), "--rays", "0x500"], "500x500");
     refused(f, &["points", &scene("cornell.gltf"), "--camera", "nobody"], "nobody");
-    refused(f, &["points", &scene("cornell.gltf"), "--near", "200mm", "--far", "100mm"], "far");
+    refused(f, &["points", &scene("cornell.gltf"), "--near", "-200mm", "--far", "-100mm"], "far");
     for (wavelengths, expected) in [
         ("638nm,520nm", "three wavelengths"),
         ("638,520,450", "unit"),
@@ -199,18 +199,18 @@ fn bad_pictures_and_stacks_end_in_one_line() {
     image::RgbImage::new(8, 6).save(f.join("black.png")).expect("picture");
     write(f, "torn.png", b"\x89PNG\r\n\x1a\n0000");
     refused(f, &["compute", "a.png+b.png", "--layers", "4"], "9×6 pixels");
-    refused(f, &["compute", "a.png@100mm+b.png@120mm"], "9×6 pixels");
-    refused(f, &["compute", "a.png@100mm+b.png"], "has no distance");
+    refused(f, &["compute", "a.png@-100mm+b.png@-120mm"], "9×6 pixels");
+    refused(f, &["compute", "a.png@-100mm+b.png"], "has no depth");
     refused(f, &["compute", "a.png@ten"], "ten");
-    refused(f, &["compute", "torn.png@100mm"], "torn.png");
-    refused(f, &["compute", "gone.png@100mm"], "gone.png");
-    refused(f, &["compute", "black.png@100mm"], "black everywhere");
-    refused(f, &["compute", "a.png@-700mm"], "not in front of the eye");
+    refused(f, &["compute", "torn.png@-100mm"], "torn.png");
+    refused(f, &["compute", "gone.png@-100mm"], "gone.png");
+    refused(f, &["compute", "black.png@-100mm"], "black everywhere");
+    refused(f, &["compute", "a.png@700mm"], "not in front of the eye");
     refused(f, &["compute", "a.png+a.png", "--layers", "0"], "one to 4096");
     refused(f, &["compute", "a.png+a.png", "--layers", "16", "--memory", "10MB"], "give more memory or fewer layers");
-    refused(f, &["compute", "a.png@100mm", "--layers", "3"], "leave --layers out");
+    refused(f, &["compute", "a.png@-100mm", "--layers", "3"], "leave --layers out");
     refused(f, &["compute", &scene("cornell.gltf"), "--layers", "3"], "picture with depth");
-    refused(f, &["show", "a.png@100mm"], "focal stack");
+    refused(f, &["show", "a.png@-100mm"], "focal stack");
     refused(
         f,
         &["points", &scene("cornell.gltf"), "--rays", "20x20", "--placement", "model", "--depth-map", "d.png"],
@@ -298,6 +298,35 @@ fn a_reference_that_aliases_is_refused_with_numbers() {
         let encode =
             ["encode", "field.npy", "--panel", panel, "--encoding", "off-axis-bipolar", "--reference-angle", "85deg"];
         refused(f, &encode, "limit");
+    }
+}
+
+#[test]
+fn a_depth_on_the_other_side_than_the_content_is_told_with_both_numbers() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    let generic =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("calib/generic.toml")).expect("profile");
+    write(f, "small.toml", generic.replace("width = 1920", "width = 96").replace("height = 1080", "height = 64"));
+    let cloud = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 -0.03\n";
+    write(f, "p.ply", cloud);
+    let said = |arguments: &[&str]| {
+        let out = holodrive(f, arguments);
+        let said = String::from_utf8_lossy(&out.stderr).to_string();
+        assert!(out.status.success(), "{arguments:?}: {said}");
+        said
+    };
+    let same = said(&["compute", "p.ply", "--panel", "small.toml", "-o", "field.npy"]);
+    // The old name of --engine, for one release.
+    assert_eq!(same, said(&["compute", "p.ply", "--panel", "small.toml", "--method", "direct", "-o", "other.npy"]));
+    said(&["encode", "field.npy", "--panel", "small.toml", "--method", "double-phase", "-o", "frame.png"]);
+    for input in ["field.npy", "frame.png"] {
+        assert_eq!(said(&["reconstruct", input, "--distance", "-30mm"]), "");
+        for flags in [&["--distance", "30mm"][..], &["--eye", "0mm,0mm,600mm", "--focus", "30mm"]] {
+            let warned = said(&[&["reconstruct", input][..], flags].concat());
+            let all = ["30mm is in front of", "behind it, from -30mm", "negative behind the panel"];
+            assert!(all.iter().all(|part| warned.contains(part)), "{warned}");
+        }
     }
 }
 
@@ -411,7 +440,7 @@ fn serve_takes_frames_without_a_panel_and_refuses_in_one_line() {
     let idle = image::open(f.join("frames/frame-000000.png")).expect("idle frame").into_luma8();
     assert!(idle.into_raw().iter().all(|&level| level == 9));
     // The file says enough for what would be seen of it.
-    let seen = holodrive(f, &["reconstruct", "frames/frame-000002.png", "--distance", "20mm", "-o", "seen.png"]);
+    let seen = holodrive(f, &["reconstruct", "frames/frame-000002.png", "--distance", "-20mm", "-o", "seen.png"]);
     assert!(seen.status.success(), "{}", String::from_utf8_lossy(&seen.stderr));
     #[cfg(unix)]
     {

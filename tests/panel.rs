@@ -424,7 +424,7 @@ fn pictures_at_depths_blazes_lenses_and_views() {
                 "--encoding",
                 method,
                 "--depths",
-                "5mm,6mm,7mm",
+                "-5mm,-6mm,-7mm",
                 "--iterations",
                 "60",
                 "-o",
@@ -443,7 +443,7 @@ fn pictures_at_depths_blazes_lenses_and_views() {
         let (frame, _) = Frame::read(&f.join("planes.png"), None, None).expect("frame");
         assert_eq!(frame.metadata.origin.depth, Some([-0.005, -0.007]));
     }
-    done(f, &["reconstruct", "planes.png", "--distance", "6mm", "-o", "seen.png"]);
+    done(f, &["reconstruct", "planes.png", "--distance", "-6mm", "-o", "seen.png"]);
 
     // A field, sent aside and through a lens of the pattern's own.
     let cloud = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0.0001 0 -0.01\n";
@@ -451,7 +451,7 @@ fn pictures_at_depths_blazes_lenses_and_views() {
     done(f, &["compute", "p.ply", "--panel", "panel.toml", "-o", "field.npy"]);
     let orders = |flags: &[&str]| {
         done(f, &[&["encode", "field.npy", "--panel", "panel.toml", "-o", "frame.png"][..], flags].concat());
-        done(f, &["reconstruct", "frame.png", "--distance", "10mm", "--size", "40x30", "-o", "seen.png"])["orders"]
+        done(f, &["reconstruct", "frame.png", "--distance", "-10mm", "--size", "40x30", "-o", "seen.png"])["orders"]
             .clone()
     };
     let straight = orders(&[]);
@@ -468,7 +468,18 @@ fn pictures_at_depths_blazes_lenses_and_views() {
         orders(flags);
         done(
             f,
-            &["reconstruct", "frame.png", "--distance", "10mm", "--half", "0.3mm", "--size", "30x30", "-o", "seen.npy"],
+            &[
+                "reconstruct",
+                "frame.png",
+                "--distance",
+                "-10mm",
+                "--half",
+                "0.3mm",
+                "--size",
+                "30x30",
+                "-o",
+                "seen.npy",
+            ],
         );
         let seen = npy::read_real(&f.join("seen.npy")).expect("picture").values;
         (0..seen.len()).max_by(|&a, &b| seen[a].total_cmp(&seen[b])).expect("cells")
@@ -520,10 +531,10 @@ fn pictures_at_depths_blazes_lenses_and_views() {
             "field",
         ),
         (&["encode", "rgb.png", "--panel", "panel.toml", "-o", "x.png"], "--depths"),
-        (&["encode", "rgb.png", "--panel", "panel.toml", "--depths", "5mm,6mm", "-o", "x.png"], "one"),
+        (&["encode", "rgb.png", "--panel", "panel.toml", "--depths", "-5mm,-6mm", "-o", "x.png"], "one"),
         (&["encode", "rgb.png", "--panel", "panel.toml", "--depths", "5", "-o", "x.png"], "unit"),
-        (&["encode", "rgb.png", "--panel", "panel.toml", "--depths", "5mm", "--window", "2", "-o", "x.png"], "window"),
-        (&["encode", "field.npy", "--panel", "panel.toml", "--depths", "5mm", "-o", "x.png"], "depths"),
+        (&["encode", "rgb.png", "--panel", "panel.toml", "--depths", "-5mm", "--window", "2", "-o", "x.png"], "window"),
+        (&["encode", "field.npy", "--panel", "panel.toml", "--depths", "-5mm", "-o", "x.png"], "depths"),
         (&["encode", "field.npy", "--panel", "panel.toml", "--iterations", "5", "-o", "x.png"], "iterations"),
         (&["encode", "field.npy", "--panel", "panel.toml", "--blaze", "95deg", "-o", "x.png"], "blaze"),
         (&["encode", "field.npy", "--panel", "panel.toml", "--blaze", "5deg", "-o", "x.png"], "limit"),
@@ -535,7 +546,7 @@ fn pictures_at_depths_blazes_lenses_and_views() {
             "reference",
         ),
         (
-            &["reconstruct", "field.npy", "--distance", "5mm", "--views", "3x2", "--eye-box", "2mm", "-o", "x.png"],
+            &["reconstruct", "field.npy", "--distance", "-5mm", "--views", "3x2", "--eye-box", "2mm", "-o", "x.png"],
             "--eye",
         ),
         (&["show", "field.npy", "--panel", "panel.toml", "--subframes", "3", "-o", "."], "sub-frames"),

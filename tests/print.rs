@@ -260,7 +260,11 @@ fn plates_that_would_be_wrong_are_refused_in_a_line() {
     refused(f, &print_into("out", &["--shard", "4/4"]), "4/4");
     refused(f, &print_into("out", &["--shard", "auto"]), "SLURM_ARRAY_TASK_ID");
     refused(f, &["print", "verify", "."], "no manifest.json");
-    refused(f, &["print", "preview", ".", "--eye", "0mm,0mm,9mm", "--focus", "5mm", "-o", "p.png"], "no manifest.json");
+    refused(
+        f,
+        &["print", "preview", ".", "--eye", "0mm,0mm,9mm", "--focus", "-5mm", "-o", "p.png"],
+        "no manifest.json",
+    );
     fs::create_dir(f.join("strange")).expect("folder");
     fs::write(f.join("strange/plate.tif"), "mine").expect("file");
     refused(f, &print_into("strange", &[]), "without a manifest");
@@ -448,9 +452,9 @@ fn five_eyes_see_in_the_fringes_what_rays_show_each_of_them() {
     let (mut seen, mut traced) = (Vec::new(), Vec::new());
     for (i, eye) in eyes.into_iter().enumerate() {
         let (at, name) = (format!("{eye},40mm"), format!("eye{i}.png"));
-        let preview = ["print", "preview", "plate", "--eye", &at, "--focus", "6mm", "--traced", &scene, "-o", &name];
+        let preview = ["print", "preview", "plate", "--eye", &at, "--focus", "-6mm", "--traced", &scene, "-o", &name];
         let report = done(f, &preview);
-        assert_eq!(report["focus"], -6e-3, "without a sign it is the scene's side");
+        assert_eq!(report["focus"], -6e-3);
         seen.push(picture(&f.join(&name)));
         traced.push(picture(&f.join(format!("eye{i}-traced.png"))));
     }

@@ -140,10 +140,7 @@ fn pictures(args: &ShowArgs, made: &Made, progress: &Progress) -> Result<Vec<Pic
     let view = &made.lit.view;
     let (field, mut settings) = pipeline::simulated_light(&made.encoded.frame, &Simulation::default(), progress)?;
     settings.block_zero_order(args.zero_order_stop, field.wavelength);
-    let z = match &args.sequence.focus {
-        Some(text) => super::commands::depth(text, made.encoded.frame.metadata.origin.depth)?,
-        None => view.focus.first().map_or(0.0, |(_, z)| *z),
-    };
+    let z = args.sequence.focus.unwrap_or_else(|| view.focus.first().map_or(0.0, |(_, z)| *z));
     let size = (CELL, ((CELL * view.height) as f64 / view.width as f64).round().clamp(1.0, 4.0 * CELL as f64) as usize);
     let traced = luminance_picture(&made.lit);
     let cells = Grid::new(traced.width, traced.height, 1.0, 1.0)?;

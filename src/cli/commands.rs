@@ -17,7 +17,7 @@ use holodrive::pipeline::{self, Lit};
 use holodrive::points::{Placement, PointCloud, images, ply};
 use holodrive::propagation::{self, Propagator};
 use holodrive::reconstruction::{self, Picture, Scale, View, ViewSettings, orders, write_rgb_png};
-use holodrive::units::{self, show_length};
+use holodrive::units::show_length;
 use holodrive::{Error, Result};
 use std::path::Path;
 use std::time::Instant;
@@ -169,14 +169,6 @@ pub(super) fn propagate(args: &PropagateArgs) -> Result<Report> {
     Ok(report)
 }
 
-/// A depth as it was typed: signed is z, unsigned lies on the side of the content.
-pub(super) fn depth(text: &str, content: Option<[f64; 2]>) -> Result<f64> {
-    let value = units::length(text)?;
-    let signed = text.trim_start().starts_with(['+', '-']);
-    let behind = content.is_some_and(|[near, far]| near + far < 0.0);
-    Ok(if !signed && behind { -value } else { value })
-}
-
 pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
     let mut report = Report::new("reconstruct");
     let bar = Bar::new();
@@ -218,11 +210,15 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
         _ => return Err(Error::input(&args.input, "is neither a frame (.png, .bmp) nor a field (.npy)")),
     };
     settings.propagation = propagation::Settings::default();
-    let view = match (args.eye, &args.focus, &args.distance) {
+    let view = match (args.eye, args.focus, args.distance) {
         (Some(position), Some(focus), _) => {
-            View::Eye { position, pupil: args.pupil, focus: depth(focus, content.depth)? }
+            report.check_side("focus", focus, content.depth);
+            View::Eye { position, pupil: args.pupil, focus }
         }
-        (_, _, Some(distance)) => View::Plane { z: depth(distance, content.depth)? - content.z },
+        (_, _, Some(distance)) => {
+            report.check_side("distance", distance, content.depth);
+            View::Plane { z: distance - content.z }
+        }
         _ => return Err(Error::parameter("distance", "give --distance, or --eye with --focus")),
     };
     let half = args.half.map_or_else(|| view.seen_half(&field.grid, content.eye), |[x, y]| DVec2::new(x, y));

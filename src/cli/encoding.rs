@@ -2,7 +2,6 @@
 
 use super::args::{EncodeArgs, EncodingArgs};
 use super::bar::Bar;
-use super::commands::depth;
 use super::load::{Input, Panel, input, panel, panel_correction};
 use super::report::{Report, seconds};
 use holodrive::encode::pictures::{DepthPicture, encode_planes};
@@ -50,7 +49,7 @@ pub(super) fn encode_settings(
     match &mut encoding {
         Encoding::Planes(planes) => {
             planes.iterations = iterations.unwrap_or(planes.iterations);
-            planes.depths = depths(args, content)?;
+            planes.depths = depths(args, content, report)?;
             planes.start = args.start.unwrap_or(planes.start);
         }
         Encoding::Gradient(gradient) => gradient.iterations = iterations.unwrap_or(gradient.iterations),
@@ -79,12 +78,13 @@ pub(super) fn encode_settings(
 }
 
 /// Depths as they were typed, or three over the content's.
-fn depths(args: &EncodingArgs, content: Option<[f64; 2]>) -> Result<Vec<f64>> {
+fn depths(args: &EncodingArgs, content: Option<[f64; 2]>, report: &mut Report) -> Result<Vec<f64>> {
     if args.depths.len() > 64 {
         return Err(Error::parameter("depths", format!("{} planes; at most 64", args.depths.len())));
     }
     if !args.depths.is_empty() {
-        return args.depths.iter().map(|text| depth(text, content)).collect();
+        args.depths.iter().for_each(|z| report.check_side("depths", *z, content));
+        return Ok(args.depths.clone());
     }
     Ok(match content {
         Some([near, far]) if (near - far).abs() > 1e-6 => vec![near, 0.5 * (near + far), far],
@@ -176,11 +176,10 @@ fn encode_picture(args: &EncodeArgs, panel: &Panel, progress: &Progress, report:
         Input::Frame(path) => (path, None),
         _ => return Err(Error::input(&args.input, "is neither a field (.npy) nor a picture")),
     };
-    // An unsigned depth is behind the panel, where pictures with depth stand too.
-    let depths = depths(&args.encoding, Some([-1.0, -1.0])).and_then(|depths| match args.encoding.depths.len() {
-        0 => Err(Error::parameter("depths", "give the depth at which the picture stands, such as --depths 100mm")),
-        _ => Ok(depths),
-    })?;
+    let depths = depths(&args.encoding, None, report)?;
+    if depths.is_empty() {
+        return Err(Error::parameter("depths", "give the depth at which the picture stands, such as --depths -100mm"));
+    }
     let flags = EncodingArgs { encoding: Some(chosen), ..args.encoding.clone() };
     let settings = encode_settings(&flags, panel, None, report)?;
     let Encoding::Planes(given) = &settings.encoding else {

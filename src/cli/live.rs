@@ -169,7 +169,7 @@ impl Live<'_> {
     /// Depth of the nearest object of the newest hologram.
     fn near(&self) -> f64 {
         let focus = self.newest.as_ref().and_then(|newest| newest.lit.view.focus.first());
-        focus.map_or(-self.args.placement.near, |(_, z)| *z)
+        focus.map_or(self.args.placement.near, |(_, z)| *z)
     }
 
     fn keys(&mut self, keys: &[KeyPress]) -> Result<()> {

@@ -129,11 +129,10 @@ pub(super) fn scene_settings(light: &SceneArgs, placement: &PlacementArgs, defau
     }
 }
 
-/// Flags count distances behind the panel; the library's z is negative there.
 pub(super) fn placed_by(args: &PlacementArgs) -> Placement {
     match args.placement {
-        PlacementArg::Window => Placement::Window { eye: args.viewer, near: -args.near, far: -args.far },
-        PlacementArg::Model => Placement::Model { eye: args.viewer, z: -args.distance, scale: args.scale },
+        PlacementArg::Window => Placement::Window { eye: args.viewer, near: args.near, far: args.far },
+        PlacementArg::Model => Placement::Model { eye: args.viewer, z: args.distance, scale: args.scale },
     }
 }
 
@@ -182,16 +181,15 @@ pub(super) fn input(path: &Path) -> Result<Input> {
     Ok(found)
 }
 
-/// `near.png@100mm+far.png@150mm`: distances count behind the panel.
+/// `near.png@-100mm+far.png@-150mm`.
 fn stack(text: &str) -> Result<Input> {
     let one = |part: &str| {
-        let (path, distance) = part.rsplit_once('@').ok_or_else(|| {
-            let what = format!("`{part}` has no distance; write near.png@100mm+far.png@150mm");
+        let (path, depth) = part.rsplit_once('@').ok_or_else(|| {
+            let what = format!("`{part}` has no depth; write near.png@-100mm+far.png@-150mm");
             Error::parameter("focal stack", what)
         })?;
-        let distance =
-            units::length(distance).map_err(|why| Error::parameter("focal stack", format!("{path}: {why}")))?;
-        Ok((PathBuf::from(path), -distance))
+        let z = units::length(depth).map_err(|why| Error::parameter("focal stack", format!("{path}: {why}")))?;
+        Ok((PathBuf::from(path), z))
     };
     text.split('+').map(one).collect::<Result<_>>().map(Input::Stack)
 }

@@ -9,7 +9,7 @@ use holodrive::print::{Manifest, Task};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::metrics::{blocks, likeness};
 use holodrive::reconstruction::{ColorPicture, Picture, Scale, write_rgb_png};
-use holodrive::units::{self, show_length};
+use holodrive::units::show_length;
 use holodrive::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -72,9 +72,8 @@ pub(super) fn look(args: &PreviewArgs) -> Result<Report> {
     let mut report = Report::new("print preview");
     let manifest = Manifest::of(&args.folder)?;
     let plate = &manifest.settings.plate;
-    let focus = units::length(&args.focus)?;
-    let signed = args.focus.trim_start().starts_with(['+', '-']);
-    let focus = if !signed && plate.place < 0.0 { -focus } else { focus };
+    let focus = args.focus;
+    report.check_side("focus", focus, Some([plate.place; 2]));
     let [_, _, columns, rows] = args.part.unwrap_or([0, 0, plate.width, plate.height]);
     let (wide, tall) = (columns as f64 * plate.pitch_x, rows as f64 * plate.pitch_y);
     let side = |length: f64| ((400.0 * length / wide.max(tall)).round() as usize).max(1);

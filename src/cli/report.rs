@@ -1,5 +1,6 @@
 //! What a command did: lines for people, JSON for machines.
 
+use holodrive::units::show_length;
 use holodrive::{Error, Result};
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -72,6 +73,22 @@ impl Report {
                 eprintln!("warning: {warning}");
                 self.warnings.push(warning);
             }
+        }
+    }
+    /// Warns of a typed depth on the other side of the panel than all of the content: with a wrong sign the picture is out
+    /// of focus, and nothing else tells.
+    pub(crate) fn check_side(&mut self, flag: &str, z: f64, content: Option<[f64; 2]>) {
+        let Some([near, far]) = content else { return };
+        if (near < 0.0 && far < 0.0 && z > 0.0) || (near > 0.0 && far > 0.0 && z < 0.0) {
+            let side = |z: f64| if z < 0.0 { "behind" } else { "in front of" };
+            self.warn([format!(
+                "--{flag}: {} is {} the panel, the content stands {} it, from {} to {}; depths are negative behind the panel",
+                show_length(z),
+                side(z),
+                side(near),
+                show_length(near),
+                show_length(far)
+            )]);
         }
     }
     /// The report as JSON.

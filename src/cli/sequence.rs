@@ -4,7 +4,6 @@
 use super::args::Ahead;
 use super::args::ShowArgs;
 use super::bar::Bar;
-use super::commands::depth;
 use super::load;
 use super::report::{Report, count, seconds};
 use super::show::finish;
@@ -171,7 +170,7 @@ fn prepared(args: &ShowArgs, source: &Source, mut report: Report) -> Result<Repo
     let mut number = 0;
     for shown in frames {
         bar.progress.check()?;
-        simulate(args, number, shown?, &mut sheet, &bar.progress)?;
+        simulate(args, number, shown?, &mut sheet, &bar.progress, &mut report)?;
         number += 1;
     }
     drop(bar);
@@ -198,7 +197,14 @@ pub(super) fn frame_path(output: &Path, number: usize) -> PathBuf {
 }
 
 /// Writes the frame, and puts its picture on the sheet.
-fn simulate(args: &ShowArgs, number: usize, shown: Shown, sheet: &mut ContactSheet, progress: &Progress) -> Result<()> {
+fn simulate(
+    args: &ShowArgs,
+    number: usize,
+    shown: Shown,
+    sheet: &mut ContactSheet,
+    progress: &Progress,
+    report: &mut Report,
+) -> Result<()> {
     if number == 0 {
         files::output_folder(&args.output.join("frames"))?;
     }
@@ -211,6 +217,9 @@ fn simulate(args: &ShowArgs, number: usize, shown: Shown, sheet: &mut ContactShe
     if !sheet.wants(number) {
         return Ok(());
     }
+    if let (Some(frame), Some(z)) = (levels.first(), args.sequence.focus) {
+        report.check_side("focus", z, frame.metadata.origin.depth);
+    }
     let pictures: Vec<Picture> = levels.iter().map(|frame| look(args, frame, progress)).collect::<Result<_>>()?;
     sheet.add(number, format!("#{number}"), Picture::mean(&pictures).into_iter().collect())
 }
@@ -219,10 +228,7 @@ fn look(args: &ShowArgs, frame: &Frame, progress: &Progress) -> Result<Picture> 
     let content = frame.metadata.origin.depth;
     let (field, mut settings) = pipeline::simulated_light(frame, &Simulation::default(), &progress.part())?;
     settings.block_zero_order(args.zero_order_stop, field.wavelength);
-    let z = match &args.sequence.focus {
-        Some(text) => depth(text, content)?,
-        None => content.map_or(0.0, |[near, far]| 0.5 * (near + far)),
-    };
+    let z = args.sequence.focus.unwrap_or_else(|| content.map_or(0.0, |[near, far]| 0.5 * (near + far)));
     let view = View::Plane { z };
     let half = view.seen_half(&field.grid, None);
     let size = (CELL, ((CELL as f64 * half.y / half.x).round() as usize).clamp(1, 4 * CELL));

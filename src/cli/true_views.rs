@@ -29,7 +29,7 @@ pub(super) fn compute(
         grid: panel.grid,
         wavelength: panel.wavelength,
         viewer: args.placement.viewer,
-        place: -args.placement.distance,
+        place: args.placement.distance,
         scale: args.placement.scale,
         segment,
         error: args.hologram.error,

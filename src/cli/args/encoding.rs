@@ -18,10 +18,10 @@ pub(crate) struct EncodingArgs {
     /// Wavefront correction (.npy of radians, .bmp or .png of a vendor, Santec's .csv), or `none` [default: the profile's].
     #[arg(long, value_name = "FILE")]
     pub(crate) correction: Option<String>,
-    /// Depths at which plane-gradient, gerchberg-saxton, weighted and double-constraint put the picture, from the panel,
-    /// signed as reconstruct's --distance [default: three over the content's depth].
-    #[arg(long, value_name = "LENGTH,…", value_delimiter = ',', allow_hyphen_values = true)]
-    pub(crate) depths: Vec<String>,
+    /// Depths at which plane-gradient, gerchberg-saxton, weighted and double-constraint put the picture; negative behind
+    /// the panel [default: three over the content's depth].
+    #[arg(long, value_parser = units::length, value_name = "LENGTH,…", value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) depths: Vec<f64>,
     /// Iterations of gradient and of the methods with depths.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=100_000), value_name = "N")]
     pub(crate) iterations: Option<u64>,

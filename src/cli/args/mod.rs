@@ -65,7 +65,7 @@ pub(crate) enum Command {
     Points(PointsArgs),
     /// Compute the field of a scene, point cloud, or picture with depth on the panel.
     #[command(
-        after_help = "Examples:\n  holodrive compute points.ply -o field.npy\n  holodrive compute rgb.png+depth.png --panel holoeye-pluto-2.1 --wavelength 532nm -o field.npy\n  holodrive compute rgb.png+depth.png --layers 16 -o field.npy\n  holodrive compute near.png@100mm+far.png@150mm -o field.npy\n  holodrive compute points.ply --wavelengths 638nm,520nm,450nm -o field.npy"
+        after_help = "Examples:\n  holodrive compute points.ply -o field.npy\n  holodrive compute rgb.png+depth.png --panel holoeye-pluto-2.1 --wavelength 532nm -o field.npy\n  holodrive compute rgb.png+depth.png --layers 16 -o field.npy\n  holodrive compute near.png@-100mm+far.png@-150mm -o field.npy\n  holodrive compute points.ply --wavelengths 638nm,520nm,450nm -o field.npy"
     )]
     Compute(ComputeArgs),
     /// Carry a field from its plane to another.
@@ -75,12 +75,12 @@ pub(crate) enum Command {
     Propagate(PropagateArgs),
     /// Encode a field, or a picture at depths, as a frame of drive levels for a panel.
     #[command(
-        after_help = "Examples:\n  holodrive encode field.npy --encoding double-phase -o frame.png\n  holodrive encode field.npy --encoding double-phase --blaze 0.6deg --lens 300mm -o frame.png\n  holodrive encode picture.png --encoding weighted --depths 100mm -o frame.png\n  holodrive encode rgb.png+depth.png --encoding plane-gradient --depths 100mm,120mm,150mm -o frame.png"
+        after_help = "Examples:\n  holodrive encode field.npy --encoding double-phase -o frame.png\n  holodrive encode field.npy --encoding double-phase --blaze 0.6deg --lens 300mm -o frame.png\n  holodrive encode picture.png --encoding weighted --depths -100mm -o frame.png\n  holodrive encode rgb.png+depth.png --encoding plane-gradient --depths -100mm,-120mm,-150mm -o frame.png"
     )]
     Encode(EncodeArgs),
     /// Reconstruct what is seen of a frame or a field: on a plane, or through an eye.
     #[command(
-        after_help = "Examples:\n  holodrive reconstruct frame.png --distance 120mm -o near.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus 150mm --pupil 4mm -o eye.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus 150mm --views 5x1 --eye-box 20mm -o eye.png"
+        after_help = "Examples:\n  holodrive reconstruct frame.png --distance -120mm -o near.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus -150mm --pupil 4mm -o eye.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus -150mm --views 5x1 --eye-box 20mm -o eye.png"
     )]
     Reconstruct(ReconstructArgs),
     /// The whole way: scene, points, field or frame → pictures on the simulated panel, or light on a real one.

@@ -16,14 +16,14 @@ pub(crate) struct PlacementArgs {
     /// Distance of the viewer's eye in front of the panel.
     #[arg(long, default_value = "600mm", value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) viewer: f64,
-    /// window: how far behind the panel the nearest point stands (negative: in front).
-    #[arg(long, default_value = "100mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    /// window: where the nearest point stands; negative behind the panel, positive in front.
+    #[arg(long, default_value = "-100mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) near: f64,
-    /// window: how far behind the panel the farthest point stands.
-    #[arg(long, default_value = "150mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    /// window: where the farthest point stands; negative behind the panel.
+    #[arg(long, default_value = "-150mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) far: f64,
-    /// model: how far behind the panel the scene's middle stands (negative: in front).
-    #[arg(long, default_value = "150mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    /// model: where the scene's middle stands; negative behind the panel, positive in front.
+    #[arg(long, default_value = "-150mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) distance: f64,
     /// model: metres at the panel for one metre of the scene [default: fits the view].
     #[arg(long, value_name = "FACTOR")]

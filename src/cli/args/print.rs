@@ -53,7 +53,7 @@ pub(crate) enum PrintCommand {
     Verify(VerifyArgs),
     /// Show what an eye sees of a finished plate, from the fringes in its file.
     #[command(
-        after_help = "Examples:\n  holodrive print preview plate --eye 0mm,0mm,60mm --focus 6mm -o seen.png\n  holodrive print preview plate --eye 5mm,0mm,60mm --focus 6mm --traced scenes/cornell.gltf -o right.png"
+        after_help = "Examples:\n  holodrive print preview plate --eye 0mm,0mm,60mm --focus -6mm -o seen.png\n  holodrive print preview plate --eye 5mm,0mm,60mm --focus -6mm --traced scenes/cornell.gltf -o right.png"
     )]
     Preview(PreviewArgs),
     /// Write a finished plate in another format.
@@ -76,9 +76,9 @@ pub(crate) struct PreviewArgs {
     /// Where the eye is: x,y,z (hologram frame, z in front of the plate).
     #[arg(long, value_parser = position, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub(crate) eye: [f64; 3],
-    /// Depth that it focuses on: +5mm in front of the plate, -5mm behind; without a sign the side of the scene.
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
-    pub(crate) focus: String,
+    /// Depth that it focuses on: negative behind the plate, positive in front.
+    #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) focus: f64,
     /// Diameter of the eye's pupil.
     #[arg(long, default_value = "4mm", value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) pupil: f64,

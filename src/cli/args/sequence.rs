@@ -3,6 +3,7 @@
 use super::parse::{Ahead, ahead, one_of, size};
 use clap::Args;
 use holodrive::sequence::RawFormat;
+use holodrive::units;
 use std::path::PathBuf;
 
 /// How frames in time are read and played.
@@ -31,10 +32,10 @@ pub(crate) struct SequenceArgs {
     /// Pixels of raw video.
     #[arg(long, value_parser = one_of::<RawFormat>(), default_value = "gray", value_name = "FORMAT", requires = "raw")]
     pub(crate) raw_format: RawFormat,
-    /// Plane that the contact sheet of the simulated panel is focused on, from the panel, signed as reconstruct's --distance
-    /// [default: the nearest object of a scene, the middle of the content's depth of prepared frames].
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
-    pub(crate) focus: Option<String>,
+    /// Plane that the contact sheet of the simulated panel is focused on, negative behind the panel [default: the nearest
+    /// object of a scene, the middle of the content's depth of prepared frames].
+    #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) focus: Option<f64>,
     /// Write a line of JSON for each frame to this file (a pipe will do) as soon as the panel has settled on it.
     #[arg(long, value_name = "FILE")]
     pub(crate) events: Option<PathBuf>,

@@ -41,7 +41,7 @@ pub(crate) struct PointsArgs {
 #[derive(Debug, Args)]
 pub(crate) struct ComputeArgs {
     /// A scene (.gltf, .glb), a point cloud (.ply), a picture with its depth map (rgb.png+depth.png), or a focal stack
-    /// of pictures, each with its distance behind the panel (near.png@100mm+far.png@150mm).
+    /// of pictures, each with its depth (near.png@-100mm+far.png@-150mm).
     pub(crate) input: PathBuf,
     /// The field to write (H×W complex64, metadata beside it).
     #[arg(short, long, default_value = "field.npy", value_name = "FILE")]
@@ -74,7 +74,7 @@ pub(crate) struct PropagateArgs {
     /// The field to write.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: PathBuf,
-    /// How far, with the light (negative: back).
+    /// How far, with the light, which goes to +z (negative: back).
     #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) distance: f64,
     /// Pixel pitch; one length, or x,y [default: what stands beside the field].
@@ -120,22 +120,22 @@ pub(crate) struct ReconstructArgs {
     /// Vacuum wavelength [default: what the file says, else the panel's].
     #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) wavelength: Option<f64>,
-    /// Plane in focus, from the panel: +250mm in front, -250mm behind; without a sign the side where the file says that
-    /// its content stands, else in front.
+    /// Plane in focus: negative behind the panel, positive in front.
     #[arg(
         long,
+        value_parser = units::length,
         value_name = "LENGTH",
         allow_hyphen_values = true,
         required_unless_present = "eye",
         conflicts_with = "eye"
     )]
-    pub(crate) distance: Option<String>,
+    pub(crate) distance: Option<f64>,
     /// Look through an eye or camera at x,y,z (hologram frame, z in front of the panel).
     #[arg(long, value_parser = position, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "focus")]
     pub(crate) eye: Option<[f64; 3]>,
-    /// Depth that the eye focuses on, from the panel, signed as --distance.
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
-    pub(crate) focus: Option<String>,
+    /// Depth that the eye focuses on: negative behind the panel, positive in front.
+    #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) focus: Option<f64>,
     /// Diameter of the eye's pupil.
     #[arg(long, default_value = "4mm", value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) pupil: f64,
