@@ -33,7 +33,7 @@ pub trait Named: Sized + 'static {
     /// The value of that name.
     ///
     /// # Errors
-    /// [`Error::Parameter`] that lists the names, the nearest one first.
+    /// [`Error::Parameter`] that names the nearest one and lists all.
     fn named(text: &str) -> Result<Self> {
         match Self::NAMES.iter().find(|(name, ..)| *name == text) {
             Some((_, value, _)) => Ok(value()),
@@ -46,18 +46,19 @@ pub trait Named: Sized + 'static {
 }
 
 /// What is said of a name that is none of `names`: the nearest one, and all of them.
-pub fn unknown(text: &str, names: &[&str]) -> String {
-    let near = nearest(text, names).map(|name| format!("did you mean `{name}`? ")).unwrap_or_default();
-    format!("there is no `{text}`; {near}one of {}", names.join(", "))
+fn unknown(text: &str, names: &[&str]) -> String {
+    format!("there is no `{text}`; {}one of {}", meant(text, names), names.join(", "))
 }
 
-/// The one of `names` that `text` most probably was meant to be.
-fn nearest<'a>(text: &str, names: &[&'a str]) -> Option<&'a str> {
+/// "did you mean `…`? " with the one of `names` that `text` most probably was meant to be; empty where none is near.
+pub(crate) fn meant(text: &str, names: &[&str]) -> String {
     let likeness = |name: &str| {
-        let begins = !text.is_empty() && name.starts_with(text);
-        strsim::jaro(text, name) + f64::from(u8::from(begins))
+        let parts = name.split('-').map(|part| 0.95 * strsim::jaro(text, part)).fold(0.0, f64::max);
+        strsim::jaro(text, name).max(parts)
     };
     let all = names.iter().map(|name| (likeness(name), *name));
-    let (best, name) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (best > 0.7).then_some(name)
+    match all.max_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((likeness, name)) if likeness > 0.75 => format!("did you mean `{name}`? "),
+        _ => String::new(),
+    }
 }

@@ -342,13 +342,53 @@ fn reports_are_json_and_help_has_examples() {
     assert!(report["points"].as_u64().expect("points") > 20);
     assert_eq!(report["command"], "points");
     assert!(f.join("p.ply").is_file() && f.join("t.npy").is_file());
-    for command in
-        ["points", "compute", "propagate", "encode", "reconstruct", "show", "print", "calibrate", "bench", "serve"]
-    {
-        let help = holodrive(f, &[command, "--help"]);
-        let text = String::from_utf8_lossy(&help.stdout).to_string();
-        assert!(help.status.success() && text.contains(&format!("holodrive {command} ")), "{text}");
+}
+
+#[test]
+fn help_is_short_or_has_examples_and_what_was_meant_is_told() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    for command in [
+        "points",
+        "compute",
+        "propagate",
+        "encode",
+        "reconstruct",
+        "show",
+        "print",
+        "print preview",
+        "print export",
+        "print verify",
+        "calibrate",
+        "calibrate curve",
+        "calibrate flatness",
+        "calibrate check",
+        "bench",
+        "bench encodings",
+        "bench iterations",
+        "serve",
+        "monitors",
+        "doctor",
+    ] {
+        let said = |help: &str| {
+            let out = holodrive(f, &command.split(' ').chain([help]).collect::<Vec<_>>());
+            assert!(out.status.success(), "{command}");
+            String::from_utf8_lossy(&out.stdout).to_string()
+        };
+        let (short, long) = (said("-h"), said("--help"));
+        assert!(short.lines().count() <= 40, "{command} -h has {} lines:\n{short}", short.lines().count());
+        assert!(long.contains("Example") && long.contains(&format!("  holodrive {command} ")), "{long}");
+        let deep = ["--near", "--depths", "--focus"].iter().any(|flag| long.contains(flag));
+        assert_eq!(deep || long.contains("--distance"), long.contains("--- -z --->"), "{long}");
     }
+    refused(f, &["shwo"], "did you mean `show`? (see holodrive --help)");
+    refused(f, &["calibrate", "nonsense"], "(see holodrive calibrate --help)");
+    refused(f, &["calibrate"], "a command is needed: curve, flatness, check (see holodrive calibrate --help)");
+    refused(f, &["bench"], "encodings, iterations (see holodrive bench --help)");
+    refused(f, &["show", "a.ply", "--wavelenght", "532nm"], "did you mean `--wavelength`? (see holodrive show --help)");
+    refused(f, &["compute", "a.ply", "--engine", "plane"], "did you mean `planes`?");
+    refused(f, &["encode", "a.npy", "--encoding", "doublephase"], "did you mean `double-phase`?");
+    refused(f, &["encode", "a.npy", "--panel", "plutoo"], "did you mean `holoeye-pluto-2.1`?");
 }
 
 #[test]

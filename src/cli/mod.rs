@@ -19,6 +19,7 @@ mod monitors;
 mod parallax;
 mod print;
 mod print_preview;
+mod refusal;
 mod report;
 #[cfg(feature = "display")]
 mod screen;
@@ -44,7 +45,7 @@ pub(crate) fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(refused) => {
-            eprintln!("{}", one_line(&refused));
+            eprintln!("{}", refusal::of_flags(&refused));
             return ExitCode::from(2);
         }
     };
@@ -66,20 +67,8 @@ pub(crate) fn main() -> ExitCode {
     match outcome.and_then(|report| report.print(json)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("holodrive: {error}");
+            eprintln!("{}", refusal::of_work(&error));
             ExitCode::from(if matches!(error, Error::Interrupted) { 130 } else { 2 })
         }
     }
-}
-
-/// clap's own words without its layout: the first paragraph, and where the help is.
-fn one_line(refused: &clap::Error) -> String {
-    let text = refused.to_string();
-    let first: Vec<&str> = text.lines().take_while(|l| !l.trim().is_empty()).map(str::trim).collect();
-    let words = first.join(" ");
-    let words = words.strip_prefix("error: ").unwrap_or(&words);
-    if refused.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return "holodrive: a command is needed: points, compute, propagate, encode, reconstruct, show, print, calibrate, bench, serve, monitors or doctor (see holodrive --help)".into();
-    }
-    format!("holodrive: {words} (see holodrive --help)")
 }

@@ -6,6 +6,7 @@ use super::regional::PixelCurve;
 use super::response::{Curve, DriveCurve, Modulation, PhaseSign, Response};
 use crate::error::{Error, Result};
 use crate::field::Grid;
+use crate::names;
 use crate::units::show_length;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -110,8 +111,12 @@ impl PanelProfile {
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) || path.exists() {
             return Self::read(path);
         }
-        let names = Self::embedded_names().collect::<Vec<_>>().join(", ");
-        Err(Error::calibration(name, format!("no such panel; give a .toml file or one of: {names}")))
+        let names: Vec<_> = Self::embedded_names().collect();
+        let meant = names::meant(name, &names);
+        Err(Error::calibration(
+            name,
+            format!("no such panel; {meant}give a .toml file or one of: {}", names.join(", ")),
+        ))
     }
 
     /// Names of the embedded profiles.

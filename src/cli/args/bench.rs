@@ -9,11 +9,11 @@ use std::path::PathBuf;
 pub(crate) enum BenchCommand {
     /// All encodings on a flat picture and on scenes, on three simulated panels: a table in Markdown.
     #[command(
-        after_help = "Examples:\n  holodrive bench encodings --scene scenes/cornell.gltf --scene scenes/depth-chart.gltf -o table.md\n  holodrive bench encodings --size 96x72 --iterations 20 --only double-phase --only weighted --json"
+        after_long_help = "Examples:\n  holodrive bench encodings --scene scenes/cornell.gltf --scene scenes/depth-chart.gltf -o table.md\n  holodrive bench encodings --size 96x72 --iterations 20 --only double-phase --only weighted --json"
     )]
     Encodings(EncodingsArgs),
     /// Iterations per second of the gradient descent beside the time of a pair of Fourier transforms.
-    #[command(after_help = "Example:\n  holodrive bench iterations --size 1920x1080 --planes 3")]
+    #[command(after_long_help = "Example:\n  holodrive bench iterations --size 1920x1080 --planes 3")]
     Iterations(IterationsArgs),
 }
 

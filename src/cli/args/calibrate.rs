@@ -12,23 +12,24 @@ use std::path::PathBuf;
 pub(crate) enum CalibrateCommand {
     /// The level → phase curve: without --powers the gratings to show, with it the curve that the powers tell.
     #[command(
-        after_help = "Examples:\n  holodrive calibrate curve --panel holoeye-pluto-2.1 --wavelength 532nm -o sweep\n  holodrive calibrate curve --panel holoeye-pluto-2.1 --wavelength 532nm --monitor HDMI-1 --hold 0.5 -o sweep\n  holodrive calibrate curve --panel holoeye-pluto-2.1 --wavelength 532nm --powers sweep/manifest.csv -o mine.toml\n\nThe sweep's folder holds the gratings and manifest.csv, a line for each, whose column `power` is for the power in the first order (or the zero order, --order zero). Powers may also come from any CSV with the columns level,power or level,column,row,power."
+        after_long_help = "Examples:\n  holodrive calibrate curve --panel holoeye-pluto-2.1 --wavelength 532nm -o sweep\n  holodrive calibrate curve --panel holoeye-pluto-2.1 --wavelength 532nm --monitor HDMI-1 --hold 0.5 -o sweep\n  holodrive calibrate curve --panel holoeye-pluto-2.1 --wavelength 532nm --powers sweep/manifest.csv -o mine.toml\n\nThe sweep's folder holds the gratings and manifest.csv, a line for each, whose column `power` is for the power in the first order (or the zero order, --order zero). Powers may also come from any CSV with the columns level,power or level,column,row,power."
     )]
     Curve(CurveArgs),
-    /// The bend: without --interferograms or --zernike the phase steps to show, with one of them the correction.
+    /// The wavefront error: without --interferograms or --zernike the phase steps to show, with one of them the correction.
     #[command(
-        after_help = "Examples:\n  holodrive calibrate flatness --panel mine.toml --steps 4 -o steps\n  holodrive calibrate flatness --panel mine.toml --interferograms i0.png,i1.png,i2.png,i3.png -o flat.npy --into mine.toml\n  holodrive calibrate flatness --panel mine.toml --zernike 0,0,0,0.8,-0.1 --radius 6mm -o flat.png"
+        after_long_help = "Examples:\n  holodrive calibrate flatness --panel mine.toml --steps 4 -o steps\n  holodrive calibrate flatness --panel mine.toml --interferograms i0.png,i1.png,i2.png,i3.png -o flat.npy --into mine.toml\n  holodrive calibrate flatness --panel mine.toml --zernike 0,0,0,0.8,-0.1 --radius 6mm -o flat.png"
     )]
     Flatness(FlatnessArgs),
     /// Test cards whose errors an eye sees.
     #[command(
-        after_help = "Examples:\n  holodrive calibrate check --panel mine.toml -o cards\n  holodrive calibrate check --panel mine.toml --monitor HDMI-1 --hold 10 -o cards"
+        after_long_help = "Examples:\n  holodrive calibrate check --panel mine.toml -o cards\n  holodrive calibrate check --panel mine.toml --monitor HDMI-1 --hold 10 -o cards"
     )]
     Check(CheckArgs),
 }
 
 /// Where frames are shown beside being written.
 #[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Display")]
 pub(crate) struct ShownArgs {
     /// Also show the frames one after another on this monitor (see `holodrive monitors`).
     #[arg(long, value_name = "NAME")]
@@ -40,8 +41,6 @@ pub(crate) struct ShownArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct CurveArgs {
-    #[command(flatten)]
-    pub(crate) panel: PanelArgs,
     /// Measured powers (.csv): find the curve.
     #[arg(long, value_name = "FILE")]
     pub(crate) powers: Option<PathBuf>,
@@ -65,16 +64,16 @@ pub(crate) struct CurveArgs {
     pub(crate) degree: Option<usize>,
     #[command(flatten)]
     pub(crate) shown: ShownArgs,
+    #[command(flatten)]
+    pub(crate) panel: PanelArgs,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct FlatnessArgs {
-    #[command(flatten)]
-    pub(crate) panel: PanelArgs,
     /// Pictures of the panel's pixels in interference with a flat wave, one for each step, in their order: .png, .npy.
     #[arg(long, value_name = "FILE,…", value_delimiter = ',', conflicts_with = "zernike")]
     pub(crate) interferograms: Vec<PathBuf>,
-    /// Zernike coefficients of the panel's bend in waves, from piston on, in Noll's order and normalisation.
+    /// Zernike coefficients of the panel's wavefront error in waves, from piston on, in Noll's order and normalisation.
     #[arg(long, value_name = "WAVES,…", value_delimiter = ',', allow_hyphen_values = true, requires = "radius")]
     pub(crate) zernike: Vec<f64>,
     /// Radius of the circle that the coefficients are for.
@@ -91,12 +90,12 @@ pub(crate) struct FlatnessArgs {
     pub(crate) into: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) shown: ShownArgs,
+    #[command(flatten)]
+    pub(crate) panel: PanelArgs,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
-    #[command(flatten)]
-    pub(crate) panel: PanelArgs,
     /// Folder for the cards.
     #[arg(short, long, default_value = "cards", value_name = "DIR")]
     pub(crate) output: PathBuf,
@@ -105,4 +104,6 @@ pub(crate) struct CheckArgs {
     pub(crate) distance: f64,
     #[command(flatten)]
     pub(crate) shown: ShownArgs,
+    #[command(flatten)]
+    pub(crate) panel: PanelArgs,
 }

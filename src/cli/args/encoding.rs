@@ -9,32 +9,33 @@ use holodrive::units;
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Encoding")]
 pub(crate) struct EncodingArgs {
-    /// Encoding [default: double-phase on a phase panel, off-axis-bipolar on an amplitude panel].
+    /// Encoding [default: double-phase; on an amplitude panel off-axis-bipolar].
     #[arg(long, alias = "method", value_parser = one_of::<Encoding>(), value_name = "NAME")]
     pub(crate) encoding: Option<Encoding>,
     /// Off-axis: angle of the reference wave, x or x,y.
-    #[arg(long, value_parser = angles, value_name = "ANGLE[,ANGLE]", allow_hyphen_values = true)]
+    #[arg(hide_short_help = true, long, value_parser = angles, value_name = "ANGLE[,ANGLE]", allow_hyphen_values = true)]
     pub(crate) reference_angle: Option<[f64; 2]>,
     /// Wavefront correction (.npy of radians, .bmp or .png of a vendor, Santec's .csv), or `none` [default: the profile's].
-    #[arg(long, value_name = "FILE")]
+    #[arg(hide_short_help = true, long, value_name = "FILE")]
     pub(crate) correction: Option<String>,
-    /// Depths at which plane-gradient, gerchberg-saxton, weighted and double-constraint put the picture; negative behind
-    /// the panel [default: three over the content's depth].
+    /// z of the picture's planes [default: three over the content's depth].
+    ///
+    /// Negative behind the panel. For plane-gradient, gerchberg-saxton, weighted and double-constraint.
     #[arg(long, value_parser = units::length, value_name = "LENGTH,…", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) depths: Vec<f64>,
     /// Iterations of gradient and of the methods with depths.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=100_000), value_name = "N")]
+    #[arg(hide_short_help = true, long, value_parser = clap::value_parser!(u64).range(1..=100_000), value_name = "N")]
     pub(crate) iterations: Option<u64>,
     /// First phases of the methods with depths.
-    #[arg(long, value_parser = one_of::<PlaneStart>(), value_name = "PHASES")]
+    #[arg(hide_short_help = true, long, value_parser = one_of::<PlaneStart>(), value_name = "PHASES")]
     pub(crate) start: Option<PlaneStart>,
     /// Carrier: at normal incidence the object goes aside by this angle, off the zero order; x or x,y.
-    #[arg(long, value_parser = angles, value_name = "ANGLE[,ANGLE]", allow_hyphen_values = true)]
+    #[arg(hide_short_help = true, long, value_parser = angles, value_name = "ANGLE[,ANGLE]", allow_hyphen_values = true)]
     pub(crate) blaze: Option<[f64; 2]>,
     /// Digital lens: the pattern focuses the light by this focal length.
-    #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    #[arg(hide_short_help = true, long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) lens: Option<f64>,
     /// Keep the object's light out of this angle about the axis, where a stop for the zero order stands.
-    #[arg(long, value_parser = units::angle, value_name = "ANGLE")]
+    #[arg(hide_short_help = true, long, value_parser = units::angle, value_name = "ANGLE")]
     pub(crate) band_stop: Option<f64>,
 }

@@ -16,11 +16,12 @@ pub(crate) struct HologramArgs {
     /// Largest relative L2 error of the field.
     #[arg(long, default_value_t = 1e-3, value_name = "ERROR")]
     pub(crate) error: f64,
-    /// Memory that the computation of the field may take beside points and field; less means fewer or smaller tables,
-    /// and a refusal where no engine fits.
-    #[arg(long, default_value = "1GB", value_parser = units::memory, value_name = "SIZE")]
+    /// Memory that the computation of the field may take beside points and field.
+    ///
+    /// Less means fewer or smaller tables, and a refusal where no engine fits.
+    #[arg(hide_short_help = true, long, default_value = "1GB", value_parser = units::memory, value_name = "SIZE")]
     pub(crate) memory: u64,
     /// Which light of a coloured cloud.
-    #[arg(long, value_parser = one_of::<Channel>(), default_value = "luminance", value_name = "NAME", conflicts_with = "wavelengths")]
+    #[arg(hide_short_help = true, long, value_parser = one_of::<Channel>(), default_value = "luminance", value_name = "NAME", conflicts_with = "wavelengths")]
     pub(crate) channel: Channel,
 }

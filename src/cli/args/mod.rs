@@ -3,6 +3,7 @@
 mod bench;
 mod calibrate;
 mod encoding;
+mod groups;
 mod hologram;
 mod monitors;
 mod panel;
@@ -18,6 +19,7 @@ mod steps;
 pub(crate) use bench::{BenchCommand, EncodingsArgs, IterationsArgs};
 pub(crate) use calibrate::{CalibrateCommand, CheckArgs, CurveArgs, FlatnessArgs, ShownArgs};
 pub(crate) use encoding::EncodingArgs;
+pub(crate) use groups::{Group, unused};
 pub(crate) use hologram::HologramArgs;
 pub(crate) use monitors::{DoctorArgs, MonitorsArgs};
 pub(crate) use panel::{ColorArgs, PanelArgs};
@@ -49,10 +51,31 @@ pub(crate) struct Cli {
     pub(crate) command: Command,
 }
 
+/// Which way depths count; beneath the long help of each command that takes one.
+const DEPTHS: &str = "\
+Depths are z from the panel, negative behind it and positive in front of it:
+  eye 600mm  <--- +z ---  panel 0mm  --- -z --->  scene -100mm to -150mm";
+
 /// The whole grammar. For one release the old `--method` is a hidden name of `compute`'s `--engine`, as it is of
 /// `--encoding` elsewhere.
 pub(crate) fn command() -> clap::Command {
-    Cli::command().mut_subcommand("compute", |compute| compute.mut_arg("engine", |engine| engine.alias("method")))
+    // clap lists the names of closed sets in both helps, or in none.
+    let short = std::env::args_os().any(|typed| typed == "-h");
+    Cli::command().mut_subcommands(|command| match command.get_name() {
+        "compute" => dressed(command, short).mut_arg("engine", |engine| engine.alias("method")),
+        _ => dressed(command, short),
+    })
+}
+
+fn dressed(command: clap::Command, short: bool) -> clap::Command {
+    let depths = ["near", "distance", "depths", "focus"];
+    let deep = command.get_arguments().any(|flag| depths.contains(&flag.get_id().as_str()));
+    let command = command.mut_args(|flag| flag.hide_possible_values(short));
+    let command = match command.get_after_long_help().map(ToString::to_string) {
+        Some(examples) if deep => command.after_long_help(format!("{DEPTHS}\n\n{examples}")),
+        _ => command,
+    };
+    command.mut_subcommands(|command| dressed(command, short))
 }
 
 /// The steps, one by one, and `show`, which does them all.
@@ -60,37 +83,39 @@ pub(crate) fn command() -> clap::Command {
 pub(crate) enum Command {
     /// Light a scene and trace it into point sources.
     #[command(
-        after_help = "Examples:\n  holodrive points scenes/cornell.gltf -o points.ply\n  holodrive points room.glb -o world.ply --frame world --picture traced.npy --rays 800x600\n  holodrive points room.glb --points 100000 -o points.ply"
+        after_long_help = "Examples:\n  holodrive points scenes/cornell.gltf -o points.ply\n  holodrive points room.glb -o world.ply --frame world --picture traced.npy --rays 800x600\n  holodrive points room.glb --points 100000 -o points.ply"
     )]
     Points(PointsArgs),
     /// Compute the field of a scene, point cloud, or picture with depth on the panel.
     #[command(
-        after_help = "Examples:\n  holodrive compute points.ply -o field.npy\n  holodrive compute rgb.png+depth.png --panel holoeye-pluto-2.1 --wavelength 532nm -o field.npy\n  holodrive compute rgb.png+depth.png --layers 16 -o field.npy\n  holodrive compute near.png@-100mm+far.png@-150mm -o field.npy\n  holodrive compute points.ply --wavelengths 638nm,520nm,450nm -o field.npy"
+        after_long_help = "Examples:\n  holodrive compute points.ply -o field.npy\n  holodrive compute rgb.png+depth.png --panel holoeye-pluto-2.1 --wavelength 532nm -o field.npy\n  holodrive compute rgb.png+depth.png --layers 16 -o field.npy\n  holodrive compute near.png@-100mm+far.png@-150mm -o field.npy\n  holodrive compute points.ply --wavelengths 638nm,520nm,450nm -o field.npy"
     )]
     Compute(ComputeArgs),
     /// Carry a field from its plane to another.
     #[command(
-        after_help = "Example:\n  holodrive propagate field.npy --pitch 8um --wavelength 532nm --distance 0.5m -o out.npy"
+        after_long_help = "Example:\n  holodrive propagate field.npy --pitch 8um --wavelength 532nm --distance 0.5m -o out.npy"
     )]
     Propagate(PropagateArgs),
     /// Encode a field, or a picture at depths, as a frame of drive levels for a panel.
     #[command(
-        after_help = "Examples:\n  holodrive encode field.npy --encoding double-phase -o frame.png\n  holodrive encode field.npy --encoding double-phase --blaze 0.6deg --lens 300mm -o frame.png\n  holodrive encode picture.png --encoding weighted --depths -100mm -o frame.png\n  holodrive encode rgb.png+depth.png --encoding plane-gradient --depths -100mm,-120mm,-150mm -o frame.png"
+        after_long_help = "Examples:\n  holodrive encode field.npy --encoding double-phase -o frame.png\n  holodrive encode field.npy --encoding double-phase --blaze 0.6deg --lens 300mm -o frame.png\n  holodrive encode picture.png --encoding weighted --depths -100mm -o frame.png\n  holodrive encode rgb.png+depth.png --encoding plane-gradient --depths -100mm,-120mm,-150mm -o frame.png"
     )]
     Encode(EncodeArgs),
     /// Reconstruct what is seen of a frame or a field: on a plane, or through an eye.
     #[command(
-        after_help = "Examples:\n  holodrive reconstruct frame.png --distance -120mm -o near.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus -150mm --pupil 4mm -o eye.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus -150mm --views 5x1 --eye-box 20mm -o eye.png"
+        after_long_help = "Examples:\n  holodrive reconstruct frame.png --distance -120mm -o near.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus -150mm --pupil 4mm -o eye.png\n  holodrive reconstruct field.npy --eye 0mm,0mm,600mm --focus -150mm --views 5x1 --eye-box 20mm -o eye.png"
     )]
     Reconstruct(ReconstructArgs),
-    /// The whole way: scene, points, field or frame → pictures on the simulated panel, or light on a real one.
+    /// The whole way, to pictures on the simulated panel or light on a real one.
+    ///
+    /// It begins with what the input is: scene, points, field or frame.
     #[command(
-        after_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show scenes/cornell.gltf --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive show frames/ --monitor HDMI-1 --fps 30 --loop\n  holodrive show walk.glb --fps 12\n  holodrive show room.glb --monitor HDMI-1 --live\n  ffmpeg -i levels.mkv -f rawvideo -pix_fmt gray - | holodrive show - --raw 1920x1080 --monitor HDMI-1 --fps 24"
+        after_long_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show scenes/cornell.gltf --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive show frames/ --monitor HDMI-1 --fps 30 --loop\n  holodrive show walk.glb --fps 12\n  holodrive show room.glb --monitor HDMI-1 --live\n  ffmpeg -i levels.mkv -f rawvideo -pix_fmt gray - | holodrive show - --raw 1920x1080 --monitor HDMI-1 --fps 24"
     )]
     Show(Box<ShowArgs>),
     /// Find a panel's curve and wavefront error: frames to show, and what the measured numbers say.
     #[command(
-        after_help = "Examples:\n  holodrive calibrate curve -o sweep\n  holodrive calibrate curve --powers sweep/manifest.csv -o mine.toml\n  holodrive calibrate flatness --zernike 0,0,0,0.8 --radius 6mm -o flat.npy --into mine.toml\n  holodrive calibrate check --panel mine.toml -o cards"
+        after_long_help = "Examples:\n  holodrive calibrate curve -o sweep\n  holodrive calibrate curve --powers sweep/manifest.csv -o mine.toml\n  holodrive calibrate flatness --zernike 0,0,0,0.8 --radius 6mm -o flat.npy --into mine.toml\n  holodrive calibrate check --panel mine.toml -o cards"
     )]
     Calibrate {
         /// What to find.
@@ -99,7 +124,7 @@ pub(crate) enum Command {
     },
     /// Compare what this program offers, on the simulated panel.
     #[command(
-        after_help = "Examples:\n  holodrive bench encodings\n  holodrive bench encodings --size 96x72 --iterations 20 --json"
+        after_long_help = "Examples:\n  holodrive bench encodings\n  holodrive bench encodings --size 96x72 --iterations 20 --json"
     )]
     Bench {
         /// What to compare.
@@ -108,7 +133,7 @@ pub(crate) enum Command {
     },
     /// Print a hologram: fringes of a plate of any size, tile by tile into a file.
     #[command(
-        after_help = "Examples:\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml --dry-run\n  holodrive print scenes/cornell.gltf --plate calib/plate-small.toml -o plate\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml -o plate --shard auto"
+        after_long_help = "Examples:\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml --dry-run\n  holodrive print scenes/cornell.gltf --plate calib/plate-small.toml -o plate\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml -o plate --shard auto"
     )]
     Print(PrintArgs),
     /// Keep a panel, and show on it what other programs send.
@@ -116,12 +141,13 @@ pub(crate) enum Command {
     /// Runs until Ctrl-C, or Esc on the panel. The first line says where clients come in (with --json: one line of JSON with
     /// the ports that it got); the report comes at the end.
     #[command(
-        after_help = "Examples:\n  holodrive serve --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive serve --panel generic --monitor none --slmsuite 0 --json\n  holodrive serve --panel mine.toml --monitor HDMI-1 --local --on-client-gone idle --idle flat.png\n  holodrive serve --write-python holodrive.py"
+        after_long_help = "Examples:\n  holodrive serve --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive serve --panel generic --monitor none --slmsuite 0 --json\n  holodrive serve --panel mine.toml --monitor HDMI-1 --local --on-client-gone idle --idle flat.png\n  holodrive serve --write-python holodrive.py"
     )]
     Serve(ServeArgs),
     /// List the monitors, and which panel profile fits each.
+    #[command(after_long_help = "Example:\n  holodrive monitors --panel holoeye-pluto-2.1")]
     Monitors(MonitorsArgs),
     /// Look at everything on this desktop that alters levels on their way to a panel.
-    #[command(after_help = "Examples:\n  holodrive doctor\n  holodrive doctor --monitor HDMI-1 --card card.png")]
+    #[command(after_long_help = "Examples:\n  holodrive doctor\n  holodrive doctor --monitor HDMI-1 --card card.png")]
     Doctor(DoctorArgs),
 }

@@ -8,7 +8,7 @@ use holodrive::units;
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Panel")]
 pub(crate) struct PanelArgs {
-    /// Panel profile: a name from calib/ or a TOML file.
+    /// Profile: a name from calib/ or a TOML file.
     #[arg(long, default_value = "generic", value_name = "PROFILE")]
     pub(crate) panel: String,
     /// Vacuum wavelength, with its unit [default: the panel's first].
@@ -20,8 +20,9 @@ pub(crate) struct PanelArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Panel")]
 pub(crate) struct ColorArgs {
-    /// Colour: vacuum wavelengths of three lasers, or `panel` for those of its profile. One trace makes a hologram for
-    /// each; files are named -red, -green, -blue.
+    /// Colour: wavelengths of three lasers, or `panel`.
+    ///
+    /// `panel` takes those of its profile. One trace makes a hologram for each; files are named -red, -green, -blue.
     #[arg(long, value_parser = wavelengths, value_name = "RED,GREEN,BLUE", conflicts_with = "wavelength")]
     pub(crate) wavelengths: Option<Wavelengths>,
 }

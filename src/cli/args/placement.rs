@@ -10,33 +10,35 @@ use holodrive::units;
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Placement")]
 pub(crate) struct PlacementArgs {
-    /// window: the camera's picture seen through the panel; model: the scene as a miniature.
+    /// The camera's picture through the panel as a window, or a model.
+    ///
+    /// A model is the scene as a miniature.
     #[arg(long, value_enum, default_value_t = PlacementArg::Window)]
     pub(crate) placement: PlacementArg,
     /// Distance of the viewer's eye in front of the panel.
-    #[arg(long, default_value = "600mm", value_parser = units::positive_length, value_name = "LENGTH")]
+    #[arg(hide_short_help = true, long, default_value = "600mm", value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) viewer: f64,
-    /// window: where the nearest point stands; negative behind the panel, positive in front.
+    /// window: z of the nearest point, behind is negative.
     #[arg(long, default_value = "-100mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) near: f64,
-    /// window: where the farthest point stands; negative behind the panel.
+    /// window: z of the farthest point.
     #[arg(long, default_value = "-150mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) far: f64,
-    /// model: where the scene's middle stands; negative behind the panel, positive in front.
-    #[arg(long, default_value = "-150mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    /// model: z of the scene's middle, negative behind the panel.
+    #[arg(hide_short_help = true, long, default_value = "-150mm", value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) distance: f64,
     /// model: metres at the panel for one metre of the scene [default: fits the view].
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(hide_short_help = true, long, value_name = "FACTOR")]
     pub(crate) scale: Option<f64>,
     /// Initial phase of the points.
-    #[arg(long, value_parser = one_of::<Phase>(), default_value = "random", value_name = "PHASE")]
+    #[arg(hide_short_help = true, long, value_parser = one_of::<Phase>(), default_value = "random", value_name = "PHASE")]
     pub(crate) phase: Phase,
     /// Clip light brighter than white, by its largest of red, green and blue: auto (a quarter above what 97 % of the lit
     /// pixels do not pass), none, or a radiance [default: none for `points`, auto otherwise].
-    #[arg(long, value_parser = white, value_name = "WHITE")]
+    #[arg(hide_short_help = true, long, value_parser = white, value_name = "WHITE")]
     pub(crate) white: Option<White>,
     /// Depth map of a picture: which end of its gray scale is near.
-    #[arg(long, value_parser = one_of::<DepthScale>(), default_value = "white-near", value_name = "SCALE")]
+    #[arg(hide_short_help = true, long, value_parser = one_of::<DepthScale>(), default_value = "white-near", value_name = "SCALE")]
     pub(crate) depth_scale: DepthScale,
 }
 

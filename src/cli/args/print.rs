@@ -32,33 +32,34 @@ pub(crate) struct PrintArgs {
 
 /// How a plate's scene is lit; the camera's direction is that of the viewer.
 #[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Scene")]
 pub(crate) struct PlateLightArgs {
     #[command(flatten)]
     pub(crate) file: FileArgs,
     /// Most mirrors and glass surfaces on a path of light.
-    #[arg(long, default_value_t = 32, value_name = "N")]
+    #[arg(hide_short_help = true, long, default_value_t = 32, value_name = "N")]
     pub(crate) bounces: u32,
     /// Photons that lamps send through curved mirrors and glass.
-    #[arg(long, default_value_t = 400_000, value_name = "N")]
+    #[arg(hide_short_help = true, long, default_value_t = 400_000, value_name = "N")]
     pub(crate) photons: u32,
     /// Clip light brighter than white: auto, none, or a radiance [default: auto].
-    #[arg(long, value_parser = white, value_name = "WHITE")]
+    #[arg(hide_short_help = true, long, value_parser = white, value_name = "WHITE")]
     pub(crate) white: Option<White>,
 }
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum PrintCommand {
     /// Check every byte of a finished plate against its manifest.
-    #[command(after_help = "Example:\n  holodrive print verify plate")]
+    #[command(after_long_help = "Example:\n  holodrive print verify plate")]
     Verify(VerifyArgs),
     /// Show what an eye sees of a finished plate, from the fringes in its file.
     #[command(
-        after_help = "Examples:\n  holodrive print preview plate --eye 0mm,0mm,60mm --focus -6mm -o seen.png\n  holodrive print preview plate --eye 5mm,0mm,60mm --focus -6mm --traced scenes/cornell.gltf -o right.png"
+        after_long_help = "Examples:\n  holodrive print preview plate --eye 0mm,0mm,60mm --focus -6mm -o seen.png\n  holodrive print preview plate --eye 5mm,0mm,60mm --focus -6mm --traced scenes/cornell.gltf -o right.png"
     )]
     Preview(PreviewArgs),
     /// Write a finished plate in another format.
     #[command(
-        after_help = "Examples:\n  holodrive print export plate --as zarr -o plate.zarr\n  holodrive print export plate --as png --frame 1920x1080 --serpentine -o frames\n  holodrive print export plate --as gds -o plate.gds"
+        after_long_help = "Examples:\n  holodrive print export plate --as zarr -o plate.zarr\n  holodrive print export plate --as png --frame 1920x1080 --serpentine -o frames\n  holodrive print export plate --as gds -o plate.gds"
     )]
     Export(ExportArgs),
 }

@@ -11,16 +11,16 @@ use holodrive::points::trace::MirrorDepth;
 #[command(next_help_heading = "Scene")]
 pub(crate) struct FileArgs {
     /// Camera of the scene, by name or number [default: the first].
-    #[arg(long, value_name = "NAME")]
+    #[arg(hide_short_help = true, long, value_name = "NAME")]
     pub(crate) camera: Option<String>,
     /// Animation clip, by name or number.
-    #[arg(long, value_name = "NAME")]
+    #[arg(hide_short_help = true, long, value_name = "NAME")]
     pub(crate) animation: Option<String>,
     /// Time in the animation [s].
-    #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
+    #[arg(hide_short_help = true, long, default_value_t = 0.0, value_name = "SECONDS")]
     pub(crate) time: f64,
     /// Add the light that a file without any gets, from the viewer's upper left and the camera, to the file's own.
-    #[arg(long)]
+    #[arg(hide_short_help = true, long)]
     pub(crate) viewer_light: bool,
 }
 
@@ -31,18 +31,20 @@ pub(crate) struct SceneArgs {
     /// Rays across and down.
     #[arg(long, default_value = "500x500", value_parser = size, value_name = "WxH")]
     pub(crate) rays: (usize, usize),
-    /// About this many points, whatever part of the picture is dark: only the shape of --rays is kept. At most what the
-    /// panel resolves; `eye` takes what an eye at --viewer resolves, `panel` what the panel does.
+    /// About this many points, or what `eye` or `panel` resolves.
+    ///
+    /// The eye is at --viewer. Whatever part of the picture is dark: only the shape of --rays is kept. At most what the panel resolves.
     #[arg(long, value_parser = budget, value_name = "N|eye|panel")]
     pub(crate) points: Option<Budget>,
     #[command(flatten)]
     pub(crate) file: FileArgs,
     /// Form factors: exact (1/π, polygons), or the seed paper's eq. (1) for comparison (half of the light is lost).
-    #[arg(long, value_parser = one_of::<FormFactor>(), default_value = "exact", value_name = "NAME")]
+    #[arg(hide_short_help = true, long, value_parser = one_of::<FormFactor>(), default_value = "exact", value_name = "NAME")]
     pub(crate) form_factor: FormFactor,
     /// Gather indirect light at each point with so many rays (256 where none are said) instead of reading it off the
     /// patches: slower, for when only the best will do.
     #[arg(
+        hide_short_help = true,
         long,
         value_name = "RAYS",
         num_args = 0..=1,
@@ -52,16 +54,16 @@ pub(crate) struct SceneArgs {
     )]
     pub(crate) final_gather: Option<u32>,
     /// Most mirrors and glass surfaces on a path of light.
-    #[arg(long, default_value_t = 32, value_name = "N")]
+    #[arg(hide_short_help = true, long, default_value_t = 32, value_name = "N")]
     pub(crate) bounces: u32,
     /// Depth of what is seen by way of mirrors and glass: where the eye focuses, or the length of the path as in the
     /// seed paper (the same for flat mirrors).
-    #[arg(long, value_parser = one_of::<MirrorDepth>(), default_value = "focus", value_name = "NAME")]
+    #[arg(hide_short_help = true, long, value_parser = one_of::<MirrorDepth>(), default_value = "focus", value_name = "NAME")]
     pub(crate) mirror_depth: MirrorDepth,
     /// Photons that lamps send through curved mirrors and glass (caustics); none are sent where there is none.
-    #[arg(long, default_value_t = 400_000, value_name = "N")]
+    #[arg(hide_short_help = true, long, default_value_t = 400_000, value_name = "N")]
     pub(crate) photons: u32,
     /// Seed of all random numbers.
-    #[arg(long, default_value_t = 1, value_name = "N")]
+    #[arg(hide_short_help = true, long, default_value_t = 1, value_name = "N")]
     pub(crate) seed: u64,
 }

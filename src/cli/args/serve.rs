@@ -20,59 +20,59 @@ pub(crate) enum ServedLevelsArg {
 
 #[derive(Debug, Args)]
 pub(crate) struct ServeArgs {
-    #[command(flatten)]
-    pub(crate) panel: PanelArgs,
     /// The panel's monitor (see `holodrive monitors`), several as one (DP-1+DP-2), a part of the desktop (region:x,y,w,h),
     /// or `none` for the simulated panel.
-    #[arg(long, value_name = "NAME")]
+    #[arg(help_heading = "Display", long, value_name = "NAME")]
     pub(crate) monitor: Option<String>,
     /// Speak slmsuite's protocol (RemoteSLM) on this port; 0: a free one [default: all protocols, this on 5025].
-    #[arg(long, value_name = "PORT")]
+    #[arg(help_heading = "Protocols", long, value_name = "PORT")]
     pub(crate) slmsuite: Option<u16>,
     /// Speak slmPy's protocol on this port; 0: a free one [default: all protocols, this on 9999].
-    #[arg(long, value_name = "PORT")]
+    #[arg(help_heading = "Protocols", long, value_name = "PORT")]
     pub(crate) slmpy: Option<u16>,
     /// Speak the local protocol of holodrive.py on this socket [default: NAME.sock in the user's runtime folder].
-    #[arg(long, value_name = "SOCKET", num_args = 0..=1)]
+    #[arg(help_heading = "Protocols", long, value_name = "SOCKET", num_args = 0..=1)]
     pub(crate) local: Option<Option<PathBuf>>,
     /// Address to listen on. Other machines may then write on the panel: neither protocol asks who sends.
-    #[arg(long, default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), value_name = "ADDRESS")]
+    #[arg(help_heading = "Protocols", long, default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), value_name = "ADDRESS")]
     pub(crate) listen: IpAddr,
     /// The name by which clients ask for the panel [default: its profile's].
-    #[arg(long, value_name = "NAME")]
+    #[arg(help_heading = "Panel", long, value_name = "NAME")]
     pub(crate) name: Option<String>,
     /// What is on the panel before the first frame: a level, or a picture of levels.
-    #[arg(long, default_value = "0", value_name = "LEVEL|FILE")]
+    #[arg(help_heading = "Panel", long, default_value = "0", value_name = "LEVEL|FILE")]
     pub(crate) idle: String,
     /// What stays on the panel when the client that showed the last frame goes. slmsuite's connect anew for each frame;
     /// theirs always stays.
-    #[arg(long, value_parser = one_of::<OnClientGone>(), default_value = "keep", value_name = "WHAT")]
+    #[arg(hide_short_help = true, help_heading = "Panel", long, value_parser = one_of::<OnClientGone>(), default_value = "keep", value_name = "WHAT")]
     pub(crate) on_client_gone: OnClientGone,
     /// What slmsuite's levels are: final, or calibrated here as phases.
-    #[arg(long, value_enum, default_value_t = ServedLevelsArg::Final, value_name = "WHAT")]
+    #[arg(hide_short_help = true, help_heading = "Panel", long, value_enum, default_value_t = ServedLevelsArg::Final, value_name = "WHAT")]
     pub(crate) levels: ServedLevelsArg,
     /// Wavefront correction for phases (.npy of radians, .bmp or .png of a vendor, Santec's .csv), or `none` [default: the
     /// profile's].
-    #[arg(long, value_name = "FILE")]
+    #[arg(hide_short_help = true, help_heading = "Panel", long, value_name = "FILE")]
     pub(crate) correction: Option<String>,
     /// Answer a frame only when the panel has settled on it, by its profile's settle time after the flip.
-    #[arg(long)]
+    #[arg(hide_short_help = true, help_heading = "Panel", long)]
     pub(crate) settle: bool,
     /// With --monitor none: write each frame into this folder.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
     /// A square of SIZE video pixels in a corner (top-left, top-right, bottom-left, bottom-right) that toggles between black
     /// and white with every frame, for a photodiode.
-    #[arg(long, value_name = "CORNER,SIZE")]
+    #[arg(hide_short_help = true, help_heading = "Display", long, value_name = "CORNER,SIZE")]
     pub(crate) trigger_patch: Option<String>,
     /// Show frames even where a gamma table (night light) alters their levels; a warning says what does.
-    #[arg(long)]
+    #[arg(hide_short_help = true, help_heading = "Display", long)]
     pub(crate) allow_altered_levels: bool,
     /// What brings the levels to the screen.
     #[cfg(feature = "display")]
-    #[arg(long, value_parser = one_of::<Presenter>(), default_value = "auto", value_name = "NAME")]
+    #[arg(hide_short_help = true, help_heading = "Display", long, value_parser = one_of::<Presenter>(), default_value = "auto", value_name = "NAME")]
     pub(crate) present: Presenter,
     /// Write the Python module for the local protocol to this file, and serve nothing.
-    #[arg(long, value_name = "FILE")]
+    #[arg(help_heading = "Protocols", long, value_name = "FILE")]
     pub(crate) write_python: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) panel: PanelArgs,
 }

@@ -16,54 +16,16 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct ShowArgs {
-    /// A scene, a point cloud, a picture with depth (rgb.png+depth.png), a field, a frame; or frames in time: a folder of
-    /// pictures, an array (frames × rows × columns, .npy), raw video (- for standard input).
+    /// Scene, point cloud, picture with depth, field, frame, or frames in time.
+    ///
+    /// A picture with depth is rgb.png+depth.png. Frames in time are a folder of pictures, an array (frames × rows × columns, .npy), raw video (- for standard input),
+    /// or an animated scene.
     pub(crate) input: PathBuf,
     /// Further pictures of frames, played in this order.
     pub(crate) more: Vec<PathBuf>,
     /// Folder for pictures and data.
     #[arg(short, long, default_value = "holodrive-out", value_name = "DIR")]
     pub(crate) output: PathBuf,
-    /// Show the frame fullscreen on this monitor (see `holodrive monitors`) instead of the simulated panel.
-    #[arg(long, value_name = "NAME")]
-    pub(crate) monitor: Option<String>,
-    /// How long to show it (of frames in time: the last one), in seconds [default: until Esc; frames in time end with their
-    /// last].
-    #[arg(long, value_name = "SECONDS")]
-    pub(crate) hold: Option<f64>,
-    /// Block the zero order within this angle of the axis, where the encoding's Fourier stop stands; 0deg lets it pass.
-    #[arg(long, default_value = "0.05deg", value_parser = units::angle, value_name = "ANGLE")]
-    pub(crate) zero_order_stop: f64,
-    /// Show the frame even where a gamma table (night light) alters its levels; the report says what does.
-    #[arg(long)]
-    pub(crate) allow_altered_levels: bool,
-    /// A square of SIZE video pixels in a corner (top-left, top-right, bottom-left, bottom-right) that toggles between black
-    /// and white with every frame, for a photodiode.
-    #[arg(long, value_name = "CORNER,SIZE", requires = "monitor")]
-    pub(crate) trigger_patch: Option<String>,
-    /// Encode so many sub-frames with phases of their own; shown faster than an eye sees, their speckle averages out.
-    #[arg(long, default_value_t = 1, value_name = "N", conflicts_with = "wavelengths")]
-    pub(crate) subframes: usize,
-    /// Sub-frames share out the points instead of showing all.
-    #[arg(long, requires = "subframes")]
-    pub(crate) sparse: bool,
-    /// What brings the levels to the screen.
-    #[cfg(feature = "display")]
-    #[arg(long, value_parser = one_of::<Presenter>(), default_value = "auto", value_name = "NAME")]
-    pub(crate) present: Presenter,
-    /// What is done when the monitor is unplugged or switched off.
-    #[cfg(feature = "display")]
-    #[arg(long, value_parser = one_of::<OnAbsence>(), default_value = "end", value_name = "WHAT")]
-    pub(crate) on_absence: OnAbsence,
-    /// Follow the scene: compute again when its file changes, or when keys move it (they stand in the operator's view); coarse
-    /// at once, finer while nothing moves.
-    #[arg(long, requires = "monitor")]
-    pub(crate) live: bool,
-    /// With --live: where the operator's view is shown, never on the panel's monitor: a monitor, auto or none.
-    #[arg(long, default_value = "auto", value_name = "MONITOR|auto|none")]
-    pub(crate) operator: String,
-    #[command(flatten)]
-    pub(crate) sequence: SequenceArgs,
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
     #[command(flatten)]
@@ -74,6 +36,63 @@ pub(crate) struct ShowArgs {
     pub(crate) placement: PlacementArgs,
     #[command(flatten)]
     pub(crate) hologram: HologramArgs,
+    /// Encode so many sub-frames with phases of their own; shown faster than an eye sees, their speckle averages out.
+    #[arg(
+        hide_short_help = true,
+        help_heading = "Hologram",
+        long,
+        default_value_t = 1,
+        value_name = "N",
+        conflicts_with = "wavelengths"
+    )]
+    pub(crate) subframes: usize,
+    /// Sub-frames share out the points instead of showing all.
+    #[arg(hide_short_help = true, help_heading = "Hologram", long, requires = "subframes")]
+    pub(crate) sparse: bool,
     #[command(flatten)]
     pub(crate) encoding: EncodingArgs,
+    /// Show it fullscreen on this monitor (see `holodrive monitors`).
+    ///
+    /// Instead of pictures of the simulated panel.
+    #[arg(help_heading = "Display", long, value_name = "NAME")]
+    pub(crate) monitor: Option<String>,
+    /// How long to show it, in seconds [default: until Esc].
+    ///
+    /// Of frames in time it is how long the last one stays; without it they end with their last.
+    #[arg(help_heading = "Display", long, value_name = "SECONDS")]
+    pub(crate) hold: Option<f64>,
+    /// Block the zero order within this angle of the axis, where the encoding's Fourier stop stands; 0deg lets it pass.
+    #[arg(hide_short_help = true, help_heading = "Display", long, default_value = "0.05deg", value_parser = units::angle, value_name = "ANGLE")]
+    pub(crate) zero_order_stop: f64,
+    /// Show the frame even where a gamma table (night light) alters its levels; the report says what does.
+    #[arg(hide_short_help = true, help_heading = "Display", long)]
+    pub(crate) allow_altered_levels: bool,
+    /// A square of SIZE video pixels in a corner (top-left, top-right, bottom-left, bottom-right) that toggles between black
+    /// and white with every frame, for a photodiode.
+    #[arg(hide_short_help = true, help_heading = "Display", long, value_name = "CORNER,SIZE", requires = "monitor")]
+    pub(crate) trigger_patch: Option<String>,
+    /// What brings the levels to the screen.
+    #[cfg(feature = "display")]
+    #[arg(hide_short_help = true, help_heading = "Display", long, value_parser = one_of::<Presenter>(), default_value = "auto", value_name = "NAME")]
+    pub(crate) present: Presenter,
+    /// What is done when the monitor is unplugged or switched off.
+    #[cfg(feature = "display")]
+    #[arg(hide_short_help = true, help_heading = "Display", long, value_parser = one_of::<OnAbsence>(), default_value = "end", value_name = "WHAT")]
+    pub(crate) on_absence: OnAbsence,
+    /// Follow the scene: compute again when its file changes, or when keys move it.
+    ///
+    /// The keys stand in the operator's view. A coarse hologram comes at once, finer ones while nothing moves.
+    #[arg(help_heading = "Display", long, requires = "monitor")]
+    pub(crate) live: bool,
+    /// With --live: where the operator's view is shown, never on the panel's monitor: a monitor, auto or none.
+    #[arg(
+        hide_short_help = true,
+        help_heading = "Display",
+        long,
+        default_value = "auto",
+        value_name = "MONITOR|auto|none"
+    )]
+    pub(crate) operator: String,
+    #[command(flatten)]
+    pub(crate) sequence: SequenceArgs,
 }

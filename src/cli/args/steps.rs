@@ -20,13 +20,13 @@ pub(crate) struct PointsArgs {
     #[arg(short, long, default_value = "points.ply", value_name = "FILE")]
     pub(crate) output: PathBuf,
     /// Also write the traced picture: .npy (H×W×3 float32 linear radiance) or .png.
-    #[arg(long, value_name = "FILE")]
+    #[arg(help_heading = "Output", long, value_name = "FILE")]
     pub(crate) picture: Option<PathBuf>,
     /// Also write a depth map of the traced picture: .png, 16-bit gray, between --near and --far.
-    #[arg(long, value_name = "FILE")]
+    #[arg(help_heading = "Output", long, value_name = "FILE")]
     pub(crate) depth_map: Option<PathBuf>,
     /// Frame of the positions.
-    #[arg(long, value_parser = one_of::<Frame>(), default_value = "hologram", value_name = "FRAME")]
+    #[arg(help_heading = "Output", long, value_parser = one_of::<Frame>(), default_value = "hologram", value_name = "FRAME")]
     pub(crate) frame: Frame,
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
@@ -40,8 +40,9 @@ pub(crate) struct PointsArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct ComputeArgs {
-    /// A scene (.gltf, .glb), a point cloud (.ply), a picture with its depth map (rgb.png+depth.png), or a focal stack
-    /// of pictures, each with its depth (near.png@-100mm+far.png@-150mm).
+    /// Scene, point cloud (.ply), picture with depth (rgb.png+depth.png) or focal stack.
+    ///
+    /// A focal stack is pictures, each with its depth: near.png@-100mm+far.png@-150mm.
     pub(crate) input: PathBuf,
     /// The field to write (H×W complex64, metadata beside it).
     #[arg(short, long, default_value = "field.npy", value_name = "FILE")]
@@ -54,17 +55,19 @@ pub(crate) struct ComputeArgs {
     pub(crate) light: SceneArgs,
     #[command(flatten)]
     pub(crate) placement: PlacementArgs,
-    /// A picture with depth in this many planes, by fast transforms and without gaps, instead of points.
-    #[arg(long, value_name = "N", conflicts_with = "engine")]
-    pub(crate) layers: Option<usize>,
-    /// Layers do not hide what is behind them.
-    #[arg(long, requires = "layers")]
-    pub(crate) see_through: bool,
-    /// A scene seen truly from each segment of so many pixels of the panel, as plates are: with --placement model.
-    #[arg(long, value_name = "PIXELS", conflicts_with_all = ["layers", "engine"])]
-    pub(crate) views: Option<u64>,
     #[command(flatten)]
     pub(crate) hologram: HologramArgs,
+    /// A picture with depth in this many planes instead of points.
+    ///
+    /// By fast transforms and without gaps.
+    #[arg(help_heading = "Hologram", long, value_name = "N", conflicts_with = "engine")]
+    pub(crate) layers: Option<usize>,
+    /// Layers do not hide what is behind them.
+    #[arg(help_heading = "Hologram", hide_short_help = true, long, requires = "layers")]
+    pub(crate) see_through: bool,
+    /// A scene seen truly from each segment of so many pixels of the panel, as plates are: with --placement model.
+    #[arg(help_heading = "Hologram", hide_short_help = true, long, value_name = "PIXELS", conflicts_with_all = ["layers", "engine"])]
+    pub(crate) views: Option<u64>,
 }
 
 #[derive(Debug, Args)]
@@ -78,16 +81,16 @@ pub(crate) struct PropagateArgs {
     #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) distance: f64,
     /// Pixel pitch; one length, or x,y [default: what stands beside the field].
-    #[arg(long, value_parser = lengths, value_name = "LENGTH[,LENGTH]")]
+    #[arg(help_heading = "Panel", long, value_parser = lengths, value_name = "LENGTH[,LENGTH]")]
     pub(crate) pitch: Option<[f64; 2]>,
     /// Vacuum wavelength [default: what stands beside the field].
-    #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
+    #[arg(help_heading = "Panel", long, value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) wavelength: Option<f64>,
     /// Wave equation.
     #[arg(long, value_parser = one_of::<Kernel>(), default_value = "angular-spectrum", value_name = "NAME")]
     pub(crate) kernel: Kernel,
     /// Take pitch and wavelength from this panel profile.
-    #[arg(long, value_name = "PROFILE")]
+    #[arg(help_heading = "Panel", long, value_name = "PROFILE")]
     pub(crate) panel: Option<String>,
 }
 
@@ -99,7 +102,7 @@ pub(crate) struct EncodeArgs {
     #[arg(short, long, default_value = "frame.png", value_name = "FILE")]
     pub(crate) output: PathBuf,
     /// Part of the panel's sides that a picture takes; the light beside it is free.
-    #[arg(long, default_value_t = 0.75, value_name = "SHARE")]
+    #[arg(help_heading = "Encoding", long, default_value_t = 0.75, value_name = "SHARE")]
     pub(crate) window: f64,
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
@@ -115,13 +118,14 @@ pub(crate) struct ReconstructArgs {
     #[arg(short, long, default_value = "picture.png", value_name = "FILE")]
     pub(crate) output: PathBuf,
     /// Panel profile [default: what the file says, else generic].
-    #[arg(long, value_name = "PROFILE")]
+    #[arg(help_heading = "Panel", long, value_name = "PROFILE")]
     pub(crate) panel: Option<String>,
     /// Vacuum wavelength [default: what the file says, else the panel's].
-    #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
+    #[arg(help_heading = "Panel", long, value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) wavelength: Option<f64>,
     /// Plane in focus: negative behind the panel, positive in front.
     #[arg(
+        help_heading = "View",
         long,
         value_parser = units::length,
         value_name = "LENGTH",
@@ -131,39 +135,39 @@ pub(crate) struct ReconstructArgs {
     )]
     pub(crate) distance: Option<f64>,
     /// Look through an eye or camera at x,y,z (hologram frame, z in front of the panel).
-    #[arg(long, value_parser = position, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "focus")]
+    #[arg(help_heading = "View", long, value_parser = position, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "focus")]
     pub(crate) eye: Option<[f64; 3]>,
     /// Depth that the eye focuses on: negative behind the panel, positive in front.
-    #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    #[arg(help_heading = "View", long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) focus: Option<f64>,
     /// Diameter of the eye's pupil.
-    #[arg(long, default_value = "4mm", value_parser = units::positive_length, value_name = "LENGTH")]
+    #[arg(help_heading = "View", long, default_value = "4mm", value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) pupil: f64,
     /// Pixels of the picture [default: one for each sample of the field].
-    #[arg(long, value_parser = size, value_name = "WxH")]
+    #[arg(help_heading = "Picture", long, value_parser = size, value_name = "WxH")]
     pub(crate) size: Option<(usize, usize)>,
     /// Half width and half height of the view on the plane in focus [default: the panel's, widened as the eye sees it].
-    #[arg(long, value_parser = lengths, value_name = "LENGTH[,LENGTH]")]
+    #[arg(hide_short_help = true, help_heading = "Picture", long, value_parser = lengths, value_name = "LENGTH[,LENGTH]")]
     pub(crate) half: Option<[f64; 2]>,
     /// Part of the pixels that is not shown brighter than white.
-    #[arg(long, default_value_t = 0.995, value_name = "PART")]
+    #[arg(help_heading = "Picture", long, default_value_t = 0.995, value_name = "PART")]
     pub(crate) white: f64,
     /// Block the zero order within this angle of the axis, where the encoding's Fourier stop stands; 0deg lets it pass.
-    #[arg(long, default_value = "0.05deg", value_parser = units::angle, value_name = "ANGLE")]
+    #[arg(hide_short_help = true, help_heading = "Panel", long, default_value = "0.05deg", value_parser = units::angle, value_name = "ANGLE")]
     pub(crate) zero_order_stop: f64,
     /// Samples per pixel and side of the simulated panel: 1, or more to see replica orders.
-    #[arg(long, default_value_t = 1, value_name = "N")]
+    #[arg(hide_short_help = true, help_heading = "Panel", long, default_value_t = 1, value_name = "N")]
     pub(crate) subpixels: usize,
     /// Fault of the simulated panel: phases of neighbouring pixels blend by a Gaussian of so many pixels.
-    #[arg(long, default_value_t = 0.0, value_name = "PIXELS")]
+    #[arg(hide_short_help = true, help_heading = "Panel", long, default_value_t = 0.0, value_name = "PIXELS")]
     pub(crate) crosstalk: f64,
     /// Fault of the simulated panel: its bend, as a file like those of encode's --correction.
-    #[arg(long, value_name = "FILE")]
+    #[arg(hide_short_help = true, help_heading = "Panel", long, value_name = "FILE")]
     pub(crate) bend: Option<PathBuf>,
     /// With --eye: a picture from each of so many places, beside each other × one above the other; names get -column-row.
-    #[arg(long, value_parser = size, value_name = "CxR", requires = "eye", requires = "eye_box")]
+    #[arg(help_heading = "View", long, value_parser = size, value_name = "CxR", requires = "eye", requires = "eye_box")]
     pub(crate) views: Option<(usize, usize)>,
     /// Width and height over which --views moves the eye.
-    #[arg(long, value_parser = lengths, value_name = "LENGTH[,LENGTH]", requires = "views")]
+    #[arg(help_heading = "View", long, value_parser = lengths, value_name = "LENGTH[,LENGTH]", requires = "views")]
     pub(crate) eye_box: Option<[f64; 2]>,
 }
