@@ -41,26 +41,30 @@
 //! 2. [`names`]: closed sets whose values have names
 //! 3. [`progress`]: how long work tells that it moves on, and is told to stop
 //! 4. [`units`]: lengths and angles with units
-//! 5. [`files`]: files that appear whole or not at all
-//! 6. [`random`]: random numbers by seed and index
-//! 7. [`field`]: complex samples on a grid; index ↔ metre ↔ cycles/m; Fourier transforms; `.npy`
-//! 8. [`scene`]: glTF, triangles, materials, textures, lights, cameras, ray casting
-//! 9. [`illumination`]: light arriving on surfaces: form factors, radiosity, direct light
-//! 10. [`points`]: rays to point sources; how many, how bright, for which lasers; placement before the panel; PLY
-//! 11. [`propagation`]: plane to plane
-//! 12. [`hologram`]: points to the field on the panel: oracle, engines, planner
-//! 13. [`panel`]: profiles, frames of drive levels, packing, the simulated panel
-//! 14. [`encode`]: field to phase or fringes for a panel's levels and range
-//! 15. [`reconstruction`]: field to pictures, gray or in three lasers' colours, and how good they are
-//! 16. [`pipeline`]: the whole way, on one screen
-//! 17. [`sequence`]: frames in time: prepared pictures, raw video and arrays; an animated scene, frame by frame
-//! 18. [`live`]: a hologram that follows its scene's file and the operator's keys, coarse at once and refined
-//! 19. [`comparison`]: all encodings side by side, with figures
-//! 20. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
-//! 21. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols, a local one for Python; the panel kept for them
-//! 22. [`display`]: monitors and the fullscreen window (feature `display`)
+//! 5. [`config`]: TOML files whose quantities have units; errors name file and key
+//! 6. [`files`]: files that appear whole or not at all
+//! 7. [`random`]: random numbers by seed and index
+//! 8. [`field`]: complex samples on a grid; index ↔ metre ↔ cycles/m; Fourier transforms; `.npy`
+//! 9. [`scene`]: glTF, triangles, materials, textures, lights, cameras, ray casting
+//! 10. [`illumination`]: light arriving on surfaces: form factors, radiosity, direct light
+//! 11. [`points`]: rays to point sources; how many, how bright, for which lasers; placement before the panel; PLY
+//! 12. [`propagation`]: plane to plane
+//! 13. [`hologram`]: points to the field on the panel: oracle, engines, planner
+//! 14. [`panel`]: profiles, frames of drive levels, packing, the simulated panel
+//! 15. [`encode`]: field to phase or fringes for a panel's levels and range
+//! 16. [`reconstruction`]: field to pictures, gray or in three lasers' colours, and how good they are
+//! 17. [`calibration`]: what a detector or an eye saw to a panel's curve and wavefront correction
+//! 18. [`pipeline`]: the whole way, on one screen
+//! 19. [`sequence`]: frames in time: prepared pictures, raw video and arrays; an animated scene, frame by frame
+//! 20. [`live`]: a hologram that follows its scene's file and the operator's keys, coarse at once and refined
+//! 21. [`comparison`]: all encodings side by side, with figures
+//! 22. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
+//! 23. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols, a local one for Python; the panel kept for them
+//! 24. [`display`]: monitors and the fullscreen window (feature `display`)
 
+pub mod calibration;
 pub mod comparison;
+pub(crate) mod config;
 #[cfg(feature = "display")]
 pub mod display;
 pub mod encode;

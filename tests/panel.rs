@@ -2,11 +2,11 @@
 //! placement in frequency keeps the picture where it was.
 
 use glam::{DVec2, DVec3};
+use holodrive::calibration::zernike;
 use holodrive::encode::{EncodeSettings, Encoding, encode};
 use holodrive::field::{Complex32, Complex64, Field, npy};
 use holodrive::hologram::HologramSettings;
 use holodrive::names::Named;
-use holodrive::panel::calibration::zernike;
 use holodrive::panel::{Curve, Faults, Frame, PanelProfile, Response, Simulation, Wavefront, simulate, wavefront};
 use holodrive::pipeline;
 use holodrive::points::{Channel, Multiplexing, PointCloud, PointSource, SubFrames};
@@ -212,12 +212,12 @@ fn two_waves_of_bend_are_found_from_interferograms_and_from_coefficients() {
     let grid = profile.grid().expect("grid");
     let waves = [0.0, 0.1, -0.05, 0.5, 0.12, 0.0, 0.06, -0.1];
     let radians: Vec<f64> = waves.iter().map(|w| w * TAU).collect();
-    let bend = zernike::wavefront(grid, WAVELENGTH, &radians, 4.6e-4, "bend").expect("bend");
-    let ends = bend.phase.iter().fold((f32::MAX, f32::MIN), |(l, h), &p| (l.min(p), h.max(p)));
+    let error = zernike::wavefront(grid, WAVELENGTH, &radians, 4.6e-4, "error").expect("wavefront");
+    let ends = error.phase.iter().fold((f32::MAX, f32::MIN), |(l, h), &p| (l.min(p), h.max(p)));
     assert!(f64::from(ends.1 - ends.0) > 2.0 * TAU, "{ends:?}");
     done(f, &["calibrate", "flatness", "--panel", "panel.toml", "--steps", "5", "-o", "steps"]);
     let mut random = Random::new(8, 0);
-    let faults = || Faults { bend: Some(bend.clone()), ..Faults::default() };
+    let faults = || Faults { wavefront_error: Some(error.clone()), ..Faults::default() };
     for k in 0..5 {
         let (frame, _) = Frame::read(&f.join(format!("steps/step-{k:02}.png")), None, None).expect("step");
         let seen = simulate(&frame, &Simulation { faults: faults(), ..Simulation::default() }, &Progress::new())
@@ -234,7 +234,7 @@ fn two_waves_of_bend_are_found_from_interferograms_and_from_coefficients() {
     done(f, &[&base[..], &[zernike, "--radius", "460um", "-o", "flat.png", "--into", "known.toml"]].concat());
     let error = |correction: &Wavefront| {
         let miss = |a: f32, b: f32| (f64::from(a + b) + PI).rem_euclid(TAU) - PI;
-        let squares: f64 = correction.phase.iter().zip(&bend.phase).map(|(a, b)| miss(*a, *b).powi(2)).sum();
+        let squares: f64 = correction.phase.iter().zip(&error.phase).map(|(a, b)| miss(*a, *b).powi(2)).sum();
         (squares / grid.len() as f64).sqrt()
     };
     let measured = wavefront::read(&f.join("flat.npy"), None).expect("read");

@@ -188,8 +188,8 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
             let profile = args.panel.as_deref().map(PanelProfile::find).transpose()?;
             let (frame, warnings) = Frame::read(&path, profile.as_ref(), args.wavelength)?;
             report.warn(warnings);
-            let bend = args.bend.as_deref().map(|path| wavefront::read(path, None)).transpose()?;
-            let faults = Faults { crosstalk: args.crosstalk, bend, ..Faults::default() };
+            let wavefront_error = args.bend.as_deref().map(|path| wavefront::read(path, None)).transpose()?;
+            let faults = Faults { crosstalk: args.crosstalk, wavefront_error, ..Faults::default() };
             let simulation = Simulation { subsamples: args.subpixels, faults, ..Simulation::default() };
             let (field, mut settings) = pipeline::simulated_light(&frame, &simulation, &bar.progress)?;
             settings.block_zero_order(args.zero_order_stop, field.wavelength);

@@ -118,7 +118,7 @@ fn phases(target: &Field, greatest: f64, interlace: Interlace) -> Vec<f32> {
             Interlace::Rows => row % 2 == 0,
         };
         let half = (u.norm() / greatest).min(1.0).acos();
-        u.im.atan2(u.re) + if plus { half } else { -half }
+        u.arg() + if plus { half } else { -half }
     };
     target.samples.par_iter().enumerate().map(of).collect()
 }

@@ -54,14 +54,14 @@ pub(super) fn pattern(
     let mut samples: Vec<Complex32> = wishes.collect();
     let show = |wish: Complex32| -> f32 {
         // Of the incident wave only the phase counts: a lens' fall of amplitude is a per mille.
-        let (level, _) = curve.nearest(f64::from(wish.im.atan2(wish.re)));
+        let (level, _) = curve.nearest(f64::from(wish.arg()));
         curve.values()[usize::from(level)].rem_euclid(std::f64::consts::TAU) as f32
     };
     let mut phase = vec![0.0; samples.len()];
     diffuse(&mut samples, field.grid.width, settings.serpentine, |i, wish| {
         let wave = incident[i];
         phase[i] = show(wish * wave.conj());
-        wish - Complex32::from_polar(1.0, phase[i] + wave.im.atan2(wave.re))
+        wish - Complex32::from_polar(1.0, phase[i] + wave.arg())
     });
     progress.advance(1);
     let parameters = BTreeMap::from([

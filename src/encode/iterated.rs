@@ -164,7 +164,7 @@ pub(super) fn of_field(
     let mut planes = Vec::new();
     for &z in &settings.depths {
         let light = propagate(field, z, progress)?;
-        let phase = |u: &Complex32| u.im.atan2(u.re);
+        let phase = |u: &Complex32| u.arg();
         planes.push(TargetPlane {
             z,
             amplitude: light.samples.iter().map(|u| u.norm()).collect(),
@@ -175,7 +175,7 @@ pub(super) fn of_field(
         });
     }
     let start = match settings.start {
-        PlaneStart::Field => Start::Phase(field.samples.iter().map(|u| u.im.atan2(u.re)).collect()),
+        PlaneStart::Field => Start::Phase(field.samples.iter().map(|u| u.arg()).collect()),
         other => start(other, &settings.depths, profile, field.wavelength),
     };
     let found = run(&Target::Amplitude(planes), settings, start, profile, field.wavelength, illumination, progress)?;
@@ -205,7 +205,7 @@ pub(super) fn of_planes(
                 let back = propagate(&field, -plane.z, progress)?;
                 sum.iter_mut().zip(&back.samples).for_each(|(sum, u)| *sum += u);
             }
-            Start::Phase(sum.iter().map(|u| u.im.atan2(u.re)).collect())
+            Start::Phase(sum.iter().map(|u| u.arg()).collect())
         }
         other => start(other, &depths, profile, wavelength),
     };

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 /// arg u at each pixel.
 pub(super) fn pattern(field: &Field) -> Result<EncodedPattern> {
-    let phase = field.samples.par_iter().map(|u| u.im.atan2(u.re)).collect();
+    let phase = field.samples.par_iter().map(|u| u.arg()).collect();
     let pattern = Pattern::Phase(PhasePattern::new(field.grid, field.wavelength, phase)?);
     let record = EncodingRecord {
         method: "kinoform".into(),

@@ -400,7 +400,7 @@ fn straight_pattern(
         Encoding::Binary(settings) => binary::pattern(field, settings, progress),
     }?;
     if let (Pattern::Phase(pattern), false) = (&mut made.pattern, illumination == Illumination::Normal) {
-        let turn = |(phase, wave): (&mut f32, &Complex32)| *phase -= wave.im.atan2(wave.re);
+        let turn = |(phase, wave): (&mut f32, &Complex32)| *phase -= wave.arg();
         pattern.phase.par_iter_mut().zip(incident).for_each(turn);
     }
     Ok(made)

@@ -1,9 +1,9 @@
 //! Pattern → drive levels, in the one fixed order.
 
+use super::drive_curve::Modulation;
 use super::frame::{Applied, Frame, FrameMetadata};
 use super::profile::PanelProfile;
 use super::regional::PixelCurve;
-use super::response::Modulation;
 use super::wavefront::Wavefront;
 use super::{FringePattern, PhasePattern};
 use crate::error::{Error, Result};
@@ -124,7 +124,7 @@ pub fn drive(pattern: &Pattern, correction: Option<&Wavefront>, profile: &PanelP
 /// [`Error::Parameter`] when a correction has been applied already; otherwise as [`drive`].
 pub fn correct(frame: &Frame, correction: &Wavefront) -> Result<Driven> {
     if let Some(applied) = &frame.metadata.applied.correction {
-        let what = format!("`{applied}` is in the frame already; a second correction would bend the wave again");
+        let what = format!("`{applied}` is in the frame already; it would be applied twice");
         return Err(Error::parameter("correction", what));
     }
     let profile = &frame.metadata.panel;

@@ -1,7 +1,7 @@
 //! A frame of drive levels, and what has to be known to make light of it.
 
+use super::drive_curve::Modulation;
 use super::profile::PanelProfile;
-use super::response::Modulation;
 use crate::error::{Error, Result};
 use crate::field::npy::CONVENTION;
 use crate::propagation::Aperture;

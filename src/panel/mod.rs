@@ -8,8 +8,9 @@
 //!
 //! What has been done stands in the frame's metadata ([`frame::Applied`]), so that nothing is done twice.
 
-pub mod calibration;
 pub mod drive;
+mod drive_curve;
+mod embedded;
 pub mod frame;
 mod frame_file;
 mod nearest_table;
@@ -24,12 +25,13 @@ pub mod vendor;
 pub mod wavefront;
 
 pub use drive::{Driven, Pattern, correct, drive};
+pub use drive_curve::{DriveCurve, Modulation};
 pub use frame::{Applied, EncodingRecord, Frame, FrameMetadata, Illumination, Origin};
 pub use nearest_table::NearestTable;
 pub use packing::{Packing, SignalLayout, VideoFrame};
 pub use profile::{CorrectionFile, PanelKind, PanelProfile};
 pub use regional::PixelCurve;
-pub use response::{Curve, DriveCurve, Modulation, PhaseSign, Response};
+pub use response::{Curve, PhaseSign, Response};
 pub use simulated::{Faults, Residue, Simulation, simulate, simulate_sequence};
 pub use wavefront::Wavefront;
 

@@ -1,6 +1,6 @@
 //! Nearest levels by table, for frames that must be made between two refreshes.
 
-use super::response::{DriveCurve, Modulation};
+use super::drive_curve::{DriveCurve, Modulation};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -120,10 +120,10 @@ mod tests {
                 })
                 .collect();
             phases.extend([0.0, -0.0, TAU as f32, -TAU as f32, f32::MIN_POSITIVE, -1e-30, 1e-30]);
-            let bend: Vec<f32> = phases.iter().rev().copied().collect();
-            let levels = table.levels(&phases, Some(&bend)).expect("finite");
-            for ((&phase, &bend), &level) in phases.iter().zip(&bend).zip(&levels) {
-                let wish = f64::from(phase) + f64::from(bend);
+            let correction: Vec<f32> = phases.iter().rev().copied().collect();
+            let levels = table.levels(&phases, Some(&correction)).expect("finite");
+            for ((&phase, &correction), &level) in phases.iter().zip(&correction).zip(&levels) {
+                let wish = f64::from(phase) + f64::from(correction);
                 assert_eq!(level, curve.nearest(wish).0, "curve {number} at {wish}");
                 assert_eq!(table.nearest(f64::from(phase)), curve.nearest(f64::from(phase)).0);
             }

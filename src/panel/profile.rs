@@ -1,9 +1,11 @@
 //! What is known of a panel: geometry, levels, response, video signal; and which of it nobody has checked.
 
+use super::drive_curve::{DriveCurve, Modulation};
+use super::embedded::PROFILES;
 use super::packing::SignalLayout;
 use super::profile_file;
 use super::regional::PixelCurve;
-use super::response::{Curve, DriveCurve, Modulation, PhaseSign, Response};
+use super::response::{Curve, PhaseSign, Response};
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::names;
@@ -104,7 +106,7 @@ impl PanelProfile {
     /// # Errors
     /// [`Error::Calibration`] when there is neither, or when the file is not a right profile.
     pub fn find(name: &str) -> Result<Self> {
-        if let Some((_, text)) = profile_file::EMBEDDED.iter().find(|(known, _)| *known == name) {
+        if let Some((_, text)) = PROFILES.iter().find(|(known, _)| *known == name) {
             return Self::parse(text, Path::new(name));
         }
         let path = Path::new(name);
@@ -121,7 +123,7 @@ impl PanelProfile {
 
     /// Names of the embedded profiles.
     pub fn embedded_names() -> impl Iterator<Item = &'static str> {
-        profile_file::EMBEDDED.iter().map(|(name, _)| *name)
+        PROFILES.iter().map(|(name, _)| *name)
     }
 
     /// Reads a profile from a TOML file.

@@ -1,91 +1,53 @@
 //! Panel profiles as TOML: the file's keys, their units and their domains.
 
+use super::drive_curve::Modulation;
 use super::packing::{Packing, SignalLayout};
 use super::profile::{CorrectionFile, PanelKind, PanelProfile};
-use super::response::{Curve, Modulation, PhaseSign, Response};
+use super::response::{Curve, PhaseSign, Response};
 use super::vendor;
+use crate::config::{ConfigFile, Quantity};
 use crate::error::{Error, Result};
 use crate::units;
-use serde::{Deserialize, Deserializer, de};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
-use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Every profile of `calib/`, by name.
-pub(super) const EMBEDDED: &[(&str, &str)] = &[
-    ("generic", include_str!("../../calib/generic.toml")),
-    ("generic-amplitude", include_str!("../../calib/generic-amplitude.toml")),
-    ("hamamatsu-x10468", include_str!("../../calib/hamamatsu-x10468.toml")),
-    ("hamamatsu-x15213", include_str!("../../calib/hamamatsu-x15213.toml")),
-    ("holoeye-gaea-2", include_str!("../../calib/holoeye-gaea-2.toml")),
-    ("holoeye-leto-3", include_str!("../../calib/holoeye-leto-3.toml")),
-    ("holoeye-luna", include_str!("../../calib/holoeye-luna.toml")),
-    ("holoeye-pluto-2.1", include_str!("../../calib/holoeye-pluto-2.1.toml")),
-    ("jasper-jd7714", include_str!("../../calib/jasper-jd7714.toml")),
-    ("meadowlark-p1920", include_str!("../../calib/meadowlark-p1920.toml")),
-    ("santec-slm-200", include_str!("../../calib/santec-slm-200.toml")),
-    ("santec-slm-300-120hz", include_str!("../../calib/santec-slm-300-120hz.toml")),
-    ("thorlabs-exulus-hd", include_str!("../../calib/thorlabs-exulus-hd.toml")),
-    ("ti-dlp4710", include_str!("../../calib/ti-dlp4710.toml")),
-    ("ti-plm-67", include_str!("../../calib/ti-plm-67.toml")),
-];
-
-/// A quantity with its unit, still as text: a bare number is refused with words that say why.
-#[derive(Clone, Debug)]
-struct Quantity(String);
-
-impl<'de> Deserialize<'de> for Quantity {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Text;
-        impl de::Visitor<'_> for Text {
-            type Value = Quantity;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a quantity with its unit, in quotes, such as \"8um\"")
-            }
-            fn visit_str<E: de::Error>(self, text: &str) -> Result<Quantity, E> {
-                Ok(Quantity(text.to_owned()))
-            }
-        }
-        deserializer.deserialize_any(Text)
-    }
-}
-
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct ProfileFile {
-    name: String,
-    maker: String,
-    kind: PanelKind,
-    width: usize,
-    height: usize,
-    pitch: Option<Quantity>,
-    pitch_x: Option<Quantity>,
-    pitch_y: Option<Quantity>,
-    bits: u8,
-    fill_factor: f64,
+pub(super) struct ProfileFile {
+    pub(super) name: String,
+    pub(super) maker: String,
+    pub(super) kind: PanelKind,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) pitch: Option<Quantity>,
+    pub(super) pitch_x: Option<Quantity>,
+    pub(super) pitch_y: Option<Quantity>,
+    pub(super) bits: u8,
+    pub(super) fill_factor: f64,
     #[serde(default = "one")]
-    dead_space: f64,
-    #[serde(default)]
-    crosstalk: f64,
-    wavelengths: Vec<Quantity>,
-    #[serde(default)]
-    phase_sign: PhaseSign,
-    settle_time: Option<Quantity>,
-    refresh: Option<Quantity>,
-    edid: Option<String>,
-    #[serde(default)]
-    unverified: Vec<String>,
-    signal: Option<SignalFile>,
-    #[serde(default)]
-    correction: Vec<CorrectionEntry>,
-    response: Vec<ResponseFile>,
+    pub(super) dead_space: f64,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub(super) crosstalk: f64,
+    pub(super) wavelengths: Vec<Quantity>,
+    #[serde(default, skip_serializing_if = "is_increasing")]
+    pub(super) phase_sign: PhaseSign,
+    pub(super) settle_time: Option<Quantity>,
+    pub(super) refresh: Option<Quantity>,
+    pub(super) edid: Option<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) unverified: Vec<String>,
+    pub(super) signal: Option<SignalFile>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) correction: Vec<CorrectionEntry>,
+    pub(super) response: Vec<ResponseFile>,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct CorrectionEntry {
-    file: PathBuf,
-    wavelength: Option<Quantity>,
+pub(super) struct CorrectionEntry {
+    pub(super) file: PathBuf,
+    pub(super) wavelength: Option<Quantity>,
 }
 
 /// Dead space is taken to reflect as well as the active area, the worst case, where a profile does not say.
@@ -93,25 +55,34 @@ fn one() -> f64 {
     1.0
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SignalFile {
-    packing: Packing,
-    width: Option<usize>,
-    height: Option<usize>,
-    #[serde(default)]
-    column_offset: usize,
-    #[serde(default)]
-    row_offset: usize,
-    #[serde(default)]
-    flip_x: bool,
-    #[serde(default)]
-    flip_y: bool,
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
-#[derive(Deserialize)]
+fn is_increasing(sign: &PhaseSign) -> bool {
+    *sign == PhaseSign::Increasing
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SignalFile {
+    pub(super) packing: Packing,
+    pub(super) width: Option<usize>,
+    pub(super) height: Option<usize>,
+    #[serde(default)]
+    pub(super) column_offset: usize,
+    #[serde(default)]
+    pub(super) row_offset: usize,
+    #[serde(default)]
+    pub(super) flip_x: bool,
+    #[serde(default)]
+    pub(super) flip_y: bool,
+}
+
+#[derive(Clone, Copy, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-enum CurveKind {
+pub(super) enum CurveKind {
+    #[default]
     Linear,
     Table,
     Polynomial,
@@ -125,60 +96,31 @@ enum CurveKind {
     MeadowlarkLut,
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct ResponseFile {
-    kind: CurveKind,
-    wavelength: Option<Quantity>,
-    levels_for_2pi: Option<f64>,
-    unit: Option<String>,
-    values: Option<Vec<f64>>,
-    coefficients: Option<Vec<f64>>,
-    heights: Option<Vec<Quantity>>,
-    levels: Option<Vec<u16>>,
-    regions: Option<[usize; 2]>,
-    polynomials: Option<Vec<Vec<f64>>>,
-    tables: Option<Vec<Vec<f64>>>,
-    file: Option<PathBuf>,
-}
-
-/// Turns a reader's error into one about the key and the file.
-struct At<'a> {
-    source: &'a Path,
-}
-
-impl At<'_> {
-    fn refuse<T>(&self, what: impl Into<String>) -> Result<T> {
-        Err(Error::calibration(self.source, what))
-    }
-    fn read<T>(&self, key: &str, text: &Quantity, parse: impl Fn(&str) -> Result<T>) -> Result<T> {
-        parse(&text.0).map_err(|e| {
-            let what = match e {
-                Error::Parameter { what, .. } => what,
-                other => other.to_string(),
-            };
-            Error::calibration(self.source, format!("{key}: {what}"))
-        })
-    }
-    /// A file that is named beside the profile.
-    fn beside(&self, file: &Path) -> PathBuf {
-        self.source.parent().map_or_else(|| file.to_path_buf(), |folder| folder.join(file))
-    }
-    fn share(&self, key: &str, value: f64, low_is_out: bool) -> Result<f64> {
-        let good = value <= 1.0 && if low_is_out { value > 0.0 } else { value >= 0.0 };
-        if good { Ok(value) } else { self.refuse(format!("{key} = {value} is not a share between 0 and 1")) }
-    }
+pub(super) struct ResponseFile {
+    pub(super) kind: CurveKind,
+    pub(super) wavelength: Option<Quantity>,
+    pub(super) levels_for_2pi: Option<f64>,
+    pub(super) unit: Option<String>,
+    pub(super) values: Option<Vec<f64>>,
+    pub(super) coefficients: Option<Vec<f64>>,
+    pub(super) heights: Option<Vec<Quantity>>,
+    pub(super) levels: Option<Vec<u16>>,
+    pub(super) regions: Option<[usize; 2]>,
+    pub(super) polynomials: Option<Vec<Vec<f64>>>,
+    pub(super) tables: Option<Vec<Vec<f64>>>,
+    pub(super) file: Option<PathBuf>,
 }
 
 pub(super) fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
-    let at = At { source };
-    let file: ProfileFile = toml::from_str(text).map_err(|e| {
-        let line = e.span().map_or(1, |span| text[..span.start.min(text.len())].matches('\n').count() + 1);
-        // Serde's lists of expected keys are long; one line is what the user reads.
-        Error::calibration(source, format!("line {line}: {}", e.message().replace('\n', " ")))
-    })?;
+    let at = ConfigFile { source };
+    let file: ProfileFile = at.parse(text)?;
     if file.width == 0 || file.height == 0 || file.width > 1 << 16 || file.height > 1 << 16 {
         return at.refuse(format!("width × height = {}×{} must be 1 … 65536 each", file.width, file.height));
+    }
+    if file.fill_factor == 0.0 {
+        return at.refuse("fill_factor = 0 leaves nothing that modulates; it must be above 0 and at most 1");
     }
     if !(0.0..=8.0).contains(&file.crosstalk) {
         return at.refuse(format!("crosstalk = {} must be 0 … 8 pixels", file.crosstalk));
@@ -190,13 +132,7 @@ pub(super) fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
         return at
             .refuse(format!("bits = {} on a binary-dmd: its mirrors have two positions, write bits = 1", file.bits));
     }
-    let pitch = |key: &str, own: &Option<Quantity>| match (own, &file.pitch) {
-        (Some(text), None) => at.read(key, text, units::positive_length),
-        (None, Some(text)) => at.read("pitch", text, units::positive_length),
-        (Some(_), Some(_)) => at.refuse(format!("{key} stands beside pitch; give pitch, or pitch_x and pitch_y")),
-        (None, None) => at.refuse(format!("{key} is missing; give pitch = \"8um\", or pitch_x and pitch_y")),
-    };
-    let (pitch_x, pitch_y) = (pitch("pitch_x", &file.pitch_x)?, pitch("pitch_y", &file.pitch_y)?);
+    let [pitch_x, pitch_y] = at.pitches(&file.pitch, [&file.pitch_x, &file.pitch_y])?;
     let wavelengths = file
         .wavelengths
         .iter()
@@ -254,14 +190,14 @@ pub(super) fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
         pitch_x,
         pitch_y,
         bits: file.bits,
-        fill_factor: at.share("fill_factor", file.fill_factor, true)?,
-        dead_space: at.share("dead_space", file.dead_space, false)?,
+        fill_factor: at.within("fill_factor", file.fill_factor, 0.0..=1.0)?,
+        dead_space: at.within("dead_space", file.dead_space, 0.0..=1.0)?,
         wavelengths,
         responses,
         phase_sign: file.phase_sign,
         signal,
-        settle_time: file.settle_time.map(|t| at.read("settle_time", &t, units::duration)).transpose()?,
-        refresh: file.refresh.map(|t| at.read("refresh", &t, units::frequency)).transpose()?,
+        settle_time: file.settle_time.map(|t| at.read("settle_time", t, units::duration)).transpose()?,
+        refresh: file.refresh.map(|t| at.read("refresh", t, units::frequency)).transpose()?,
         edid: file.edid,
         corrections,
         crosstalk: file.crosstalk,
@@ -269,7 +205,13 @@ pub(super) fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
     })
 }
 
-fn signal(at: &At<'_>, file: Option<SignalFile>, width: usize, height: usize, bits: u8) -> Result<SignalLayout> {
+fn signal(
+    at: &ConfigFile<'_>,
+    file: Option<SignalFile>,
+    width: usize,
+    height: usize,
+    bits: u8,
+) -> Result<SignalLayout> {
     let Some(file) = file else {
         let layout = SignalLayout::plain(width, height, if bits == 1 { Packing::Gray1 } else { Packing::Gray });
         return layout.check(width, height, bits).map(|()| layout).or_else(|what| at.refuse(what));
@@ -287,8 +229,8 @@ fn signal(at: &At<'_>, file: Option<SignalFile>, width: usize, height: usize, bi
     layout.check(width, height, bits).map(|()| layout).or_else(|what| at.refuse(what))
 }
 
-fn response(at: &At<'_>, file: &ResponseFile, modulation: Modulation, levels: usize) -> Result<Response> {
-    fn need<T: Clone>(at: &At<'_>, value: &Option<T>, key: &str) -> Result<T> {
+fn response(at: &ConfigFile<'_>, file: &ResponseFile, modulation: Modulation, levels: usize) -> Result<Response> {
+    fn need<T: Clone>(at: &ConfigFile<'_>, value: &Option<T>, key: &str) -> Result<T> {
         value.clone().ok_or_else(|| Error::calibration(at.source, format!("response.{key} is missing")))
     }
     let radians = || -> Result<f64> {
@@ -380,11 +322,12 @@ fn response(at: &At<'_>, file: &ResponseFile, modulation: Modulation, levels: us
 
 #[cfg(test)]
 mod tests {
+    use super::super::embedded::PROFILES;
     use super::*;
 
     #[test]
     fn every_embedded_profile_is_right_and_named_as_its_file() {
-        for (name, text) in EMBEDDED {
+        for (name, text) in PROFILES {
             let profile = PanelProfile::parse(text, Path::new(name)).expect(name);
             assert_eq!(profile.name, *name);
             let (curve, _) = profile.drive_curve(profile.default_wavelength()).expect(name);
@@ -396,7 +339,7 @@ mod tests {
         // Plates lie beside the panels.
         let is_plate = |file: &std::fs::DirEntry| file.file_name().to_string_lossy().starts_with("plate-");
         let files = files.filter(|file| !is_plate(file.as_ref().expect("entry"))).count();
-        assert_eq!(files, EMBEDDED.len(), "a file of calib/ is not embedded");
+        assert_eq!(files, PROFILES.len(), "a file of calib/ is not embedded");
         let generic = PanelProfile::generic().expect("generic");
         assert_eq!((generic.width, generic.height, generic.bits), (1920, 1080, 8));
         assert_eq!((generic.pitch_x, generic.pitch_y, generic.default_wavelength()), (8e-6, 8e-6, 632.8e-9));
@@ -405,9 +348,10 @@ mod tests {
 
     #[test]
     fn a_written_profile_is_read_back_the_same() {
-        for (name, text) in EMBEDDED {
+        for (name, text) in PROFILES {
             let profile = PanelProfile::parse(text, Path::new(name)).expect(name);
-            let again = PanelProfile::parse(&profile.to_toml(&["remark".into()]), Path::new(name)).expect(name);
+            let again =
+                PanelProfile::parse(&profile.to_toml(&["remark".into()]).expect(name), Path::new(name)).expect(name);
             assert_eq!(again, profile, "{name}");
         }
         let mut profile = PanelProfile::generic().expect("generic");
@@ -425,7 +369,7 @@ mod tests {
             Response { wavelength: Some(640e-9), curve: polynomial(5.5) },
             Response { wavelength: None, curve: Curve::LevelTable { output: (0..128).map(|g| 2 * g).collect() } },
         ];
-        let again = PanelProfile::parse(&profile.to_toml(&[]), Path::new("x.toml")).expect("read");
+        let again = PanelProfile::parse(&profile.to_toml(&[]).expect("toml"), Path::new("x.toml")).expect("read");
         assert_eq!(again, profile);
     }
 
@@ -435,7 +379,7 @@ mod tests {
         let table: String = (0..256).map(|g| format!("{g} {}\n", 20 + g * 4 / 5)).collect();
         std::fs::write(folder.path().join("slm.lut"), &table).expect("write");
         let linear = "kind = \"linear\"\nlevels_for_2pi = 256";
-        let text = EMBEDDED[0].1.replace(linear, "kind = \"meadowlark-lut\"\nfile = \"slm.lut\"");
+        let text = PROFILES[0].1.replace(linear, "kind = \"meadowlark-lut\"\nfile = \"slm.lut\"");
         let path = folder.path().join("mine.toml");
         std::fs::write(&path, &text).expect("write");
         let profile = PanelProfile::read(&path).expect("profile");
@@ -455,8 +399,8 @@ mod tests {
 
     #[test]
     fn bad_profiles_are_refused_in_one_line_that_names_file_and_key() {
-        let good = EMBEDDED[0].1;
-        let dmd = EMBEDDED.iter().find(|(name, _)| *name == "ti-dlp4710").expect("dmd").1;
+        let good = PROFILES[0].1;
+        let dmd = PROFILES.iter().find(|(name, _)| *name == "ti-dlp4710").expect("dmd").1;
         let cases = [
             (good.replace("pitch = \"8um\"", ""), "pitch_x is missing"),
             (good.replace("pitch =", "pich ="), "pich"),
@@ -514,7 +458,7 @@ mod tests {
 
     #[test]
     fn curves_far_from_the_light_are_refused_and_near_ones_warned_of() {
-        let text = EMBEDDED[0].1.replace("levels_for_2pi = 256", "wavelength = \"632.8nm\"\nlevels_for_2pi = 200");
+        let text = PROFILES[0].1.replace("levels_for_2pi = 256", "wavelength = \"632.8nm\"\nlevels_for_2pi = 200");
         let profile = PanelProfile::parse(&text, Path::new("mine.toml")).expect("profile");
         assert!(profile.drive_curve(633e-9).expect("same").1.is_empty());
         let (curve, warnings) = profile.drive_curve(532e-9).expect("near");

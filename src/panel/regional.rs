@@ -3,7 +3,7 @@
 //! The panel is cut into equal rectangles, row by row from the upper left. Each curve holds at the middle of its rectangle;
 //! between middles phases are interpolated along both axes, beyond the outermost they stay.
 
-use super::response::{DriveCurve, Modulation};
+use super::drive_curve::{DriveCurve, Modulation};
 use crate::error::Result;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -174,7 +174,7 @@ mod tests {
             let mut worst = 0.0f64;
             for (i, (u, &wish)) in light.samples.iter().zip(&phase).enumerate() {
                 let (column, row) = (i % 31, i / 31);
-                let seen = f64::from(u.im.atan2(u.re));
+                let seen = f64::from(u.arg());
                 let miss = |seen: f64| ((seen - f64::from(wish) + PI).rem_euclid(TAU) - PI).abs();
                 // Of all levels none of the first turn comes nearer.
                 let best = (0..256).map(|l| miss(curve.value(column, row, l))).fold(f64::INFINITY, f64::min);

@@ -7,9 +7,10 @@
 //! sinc weights; nothing is folded back from above. (Samples of the bare rectangles would fold: at n = 4 and F = 0.93
 //! the first order comes out 30 % too weak.)
 
+use super::drive_curve::Modulation;
 use super::frame::{Frame, Illumination};
 use super::regional::PixelCurve;
-use super::response::{Modulation, Response};
+use super::response::Response;
 use super::wavefront::Wavefront;
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Complex64, Fft2, Field, Grid};
@@ -33,8 +34,8 @@ pub struct Simulation {
 pub struct Faults {
     /// The panel's true level → modulation, where it is not the profile's.
     pub response: Option<Response>,
-    /// The panel's bend: the phase that it adds [rad].
-    pub bend: Option<Wavefront>,
+    /// The panel's wavefront error: the phase that it adds [rad].
+    pub wavefront_error: Option<Wavefront>,
     /// Standard deviation of the Gaussian by which neighbouring pixels' phases (or amplitudes) blend [pixels], beside the
     /// profile's own.
     ///
@@ -70,7 +71,7 @@ impl Default for Faults {
     fn default() -> Self {
         Self {
             response: None,
-            bend: None,
+            wavefront_error: None,
             crosstalk: 0.0,
             phase_scale: 1.0,
             amplitude_coupling: 0.0,
@@ -87,7 +88,7 @@ impl Default for Faults {
 ///
 /// # Errors
 /// [`Error::Parameter`] for settings out of their domain, [`Error::Undersampled`] when the illumination is steeper than
-/// the samples carry, [`Error::Calibration`] when curve or bend do not fit.
+/// the samples carry, [`Error::Calibration`] when curve or wavefront error do not fit.
 pub fn simulate(frame: &Frame, settings: &Simulation, progress: &Progress) -> Result<Field> {
     let profile = &frame.metadata.panel;
     let wavelength = frame.metadata.wavelength;
@@ -120,9 +121,9 @@ pub fn simulate(frame: &Frame, settings: &Simulation, progress: &Progress) -> Re
     let grid = Grid::new(grid.width * n, grid.height * n, pitch_x, pitch_y)?;
     let illumination =
         settings.illumination.or(frame.metadata.encoding.as_ref().map(|e| e.illumination)).unwrap_or_default();
-    if let Some(bend) = &faults.bend {
-        bend.check(profile.width, profile.height, wavelength)?;
-        light(&mut samples, grid, |column, row| Complex64::cis(bend_at(bend, n, column, row)));
+    if let Some(error) = &faults.wavefront_error {
+        error.check(profile.width, profile.height, wavelength)?;
+        light(&mut samples, grid, |column, row| Complex64::cis(phase_between(error, n, column, row)));
     }
     illuminate(&mut samples, grid, wavelength, illumination)?;
     progress.advance(1);
@@ -325,16 +326,16 @@ pub(crate) fn sinc(x: f64) -> f64 {
     if x == 0.0 { 1.0 } else { (PI * x).sin() / (PI * x) }
 }
 
-/// The bend between the pixels' middles, bilinear, at a sample of the fine grid.
-fn bend_at(bend: &Wavefront, n: usize, column: usize, row: usize) -> f64 {
+/// A wavefront's phase between the pixels' middles, bilinear, at a sample of the fine grid.
+fn phase_between(wavefront: &Wavefront, n: usize, column: usize, row: usize) -> f64 {
     let split = |at: usize, size: usize| {
         let x = ((at as f64 + 0.5) / n as f64 - 0.5).clamp(0.0, size as f64 - 1.0);
         let low = (x.floor() as usize).min(size.saturating_sub(2));
         (low, (low + 1).min(size - 1), x - low as f64)
     };
-    let (left, right, u) = split(column, bend.width);
-    let (top, bottom, v) = split(row, bend.height);
-    let at = |column: usize, row: usize| f64::from(bend.phase[row * bend.width + column]);
+    let (left, right, u) = split(column, wavefront.width);
+    let (top, bottom, v) = split(row, wavefront.height);
+    let at = |column: usize, row: usize| f64::from(wavefront.phase[row * wavefront.width + column]);
     let upper = at(left, top) * (1.0 - u) + at(right, top) * u;
     let lower = at(left, bottom) * (1.0 - u) + at(right, bottom) * u;
     upper * (1.0 - v) + lower * v

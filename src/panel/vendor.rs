@@ -1,6 +1,7 @@
 //! Calibration files as panel makers write them: read as they are, never rescaled, refused with the line at fault.
 
-use super::response::{Curve, non_monotone};
+use super::drive_curve::non_monotone;
+use super::response::Curve;
 use super::wavefront::Wavefront;
 use crate::error::{Error, Result};
 use std::f64::consts::{PI, TAU};
@@ -19,7 +20,7 @@ fn bytes(path: &Path) -> Result<Vec<u8>> {
 }
 
 /// A calibration file as text.
-pub(super) fn text(path: &Path) -> Result<String> {
+pub(crate) fn text(path: &Path) -> Result<String> {
     String::from_utf8(bytes(path)?).map_err(|_| Error::calibration(path, "is no text"))
 }
 

@@ -1,4 +1,4 @@
-//! A phase over the panel's pixels: the bend of a panel, or the correction that undoes it.
+//! A phase over the panel's pixels: the wavefront error of a panel, or the correction that undoes it.
 
 use super::vendor;
 use crate::error::{Error, Result};
@@ -36,7 +36,7 @@ impl Wavefront {
         Ok(Self { name: name.into(), width, height, wavelength, phase })
     }
 
-    /// The opposite phase: the correction of a measured bend.
+    /// The opposite phase: the correction of a measured wavefront error.
     pub fn conjugate(mut self) -> Self {
         for phase in &mut self.phase {
             *phase = -*phase;

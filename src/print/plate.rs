@@ -2,13 +2,13 @@
 
 use super::reference::{Reference, Side};
 use super::slit::Slit;
+use crate::config::ConfigFile;
 pub use crate::encode::Quantity;
 use crate::error::{Error, Result};
 use crate::field::grid;
 use crate::points::colour::Lasers;
 use crate::units;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
 /// How a fringe becomes one bit.
@@ -173,35 +173,6 @@ struct SlitFile {
     wavelengths: Option<Vec<String>>,
 }
 
-/// Turns a reader's error into one about the key and the file.
-struct At<'a>(&'a Path);
-
-impl At<'_> {
-    fn refuse<T>(&self, what: impl Into<String>) -> Result<T> {
-        Err(Error::calibration(self.0, what))
-    }
-    fn read<T>(&self, key: &str, text: &str, parse: impl Fn(&str) -> Result<T>) -> Result<T> {
-        parse(text).map_err(|e| {
-            let what = match e {
-                Error::Parameter { what, .. } => what,
-                other => other.to_string(),
-            };
-            Error::calibration(self.0, format!("{key}: {what}"))
-        })
-    }
-    fn within(&self, key: &str, value: f64, low: f64, high: f64) -> Result<f64> {
-        if (low..=high).contains(&value) {
-            Ok(value)
-        } else {
-            self.refuse(format!("{key} = {value} must lie between {low} and {high}"))
-        }
-    }
-    fn angle(&self, key: &str, text: &str) -> Result<f64> {
-        let value = self.read(key, text, units::angle)?;
-        if value.abs() < FRAC_PI_2 { Ok(value) } else { self.refuse(format!("{key}: `{text}` must be below 90deg")) }
-    }
-}
-
 /// Longest side of a plate [px]: 2.6 million would be 0.9 m at 0.35 µm.
 const LONGEST: u64 = 1 << 22;
 
@@ -220,18 +191,9 @@ impl Plate {
     /// # Errors
     /// [`Error::Calibration`].
     pub fn parse(text: &str, source: &Path) -> Result<Self> {
-        let at = At(source);
-        let file: PlateFile = toml::from_str(text).map_err(|e| {
-            let line = e.span().map_or(1, |span| text[..span.start.min(text.len())].matches('\n').count() + 1);
-            Error::calibration(source, format!("line {line}: {}", e.message().replace('\n', " ")))
-        })?;
-        let pitch = |key: &str, own: &Option<String>| match (own, &file.pitch) {
-            (Some(text), None) => at.read(key, text, units::positive_length),
-            (None, Some(text)) => at.read("pitch", text, units::positive_length),
-            (Some(_), Some(_)) => at.refuse(format!("{key} stands beside pitch; give pitch, or pitch_x and pitch_y")),
-            (None, None) => at.refuse(format!("{key} is missing; give pitch = \"1um\", or pitch_x and pitch_y")),
-        };
-        let (pitch_x, pitch_y) = (pitch("pitch_x", &file.pitch_x)?, pitch("pitch_y", &file.pitch_y)?);
+        let at = ConfigFile { source };
+        let file: PlateFile = at.parse(text)?;
+        let [pitch_x, pitch_y] = at.pitches(&file.pitch, [&file.pitch_x, &file.pitch_y])?;
         let [width, height] = match (file.size, &file.extent) {
             (Some(size), None) => size,
             (None, Some([x, y])) => {
@@ -357,10 +319,10 @@ impl Plate {
             quantity: file.quantity,
             bits: file.bits,
             binarisation,
-            bias: at.within("bias", file.bias.unwrap_or(0.5), 0.0, 1.0)?,
-            contrast: at.within("contrast", file.contrast.unwrap_or(1.0), 1e-3, 1e3)?,
-            percentile: at.within("percentile", file.percentile.unwrap_or(0.999), 0.5, 1.0)?,
-            reference_ratio: at.within("reference_ratio", file.reference_ratio.unwrap_or(1.0), 1e-3, 1e3)?,
+            bias: at.within("bias", file.bias.unwrap_or(0.5), 0.0..=1.0)?,
+            contrast: at.within("contrast", file.contrast.unwrap_or(1.0), 1e-3..=1e3)?,
+            percentile: at.within("percentile", file.percentile.unwrap_or(0.999), 0.5..=1.0)?,
+            reference_ratio: at.within("reference_ratio", file.reference_ratio.unwrap_or(1.0), 1e-3..=1e3)?,
             polarity: file.polarity,
             mirror: file.mirror,
             rotation: file.rotation,
@@ -378,7 +340,7 @@ impl Plate {
             place: -at.read("scene.distance", &scene.distance, units::length)?,
             scale: scene.scale,
             object_angle,
-            error: at.within("error", file.error.unwrap_or(if file.bits == 1 { 1e-2 } else { 5e-3 }), 1e-4, 0.1)?,
+            error: at.within("error", file.error.unwrap_or(if file.bits == 1 { 1e-2 } else { 5e-3 }), 1e-4..=0.1)?,
             seed: file.seed,
         })
     }

@@ -3,7 +3,7 @@
 use super::panel::PanelArgs;
 use super::parse::{one_of, size};
 use clap::{Args, Subcommand};
-use holodrive::panel::calibration::curve::Order;
+use holodrive::calibration::Order;
 use holodrive::units;
 use std::path::PathBuf;
 

@@ -125,19 +125,19 @@ impl PanelModel {
             Some(wave) => light * wave[i].conj() - self.dead * wave[i].norm_sqr(),
         };
         if self.crosstalk == 0.0 {
-            return wished.im.atan2(wished.re);
+            return wished.arg();
         }
         let shown = self.incident.as_ref().map_or(modulated, |wave| modulated * wave[i].conj());
         let turn = wished * shown.conj();
         // Where the panel has no more range the wish must not run away.
-        let moved = before + turn.im.atan2(turn.re);
+        let moved = before + turn.arg();
         self.range.map_or(moved, |range| range.nearest(moved))
     }
 
     /// Phases of a panel in normal light turned into those that make the same light of the incident wave.
     pub(super) fn lit(&self, phases: &mut [f32]) {
         if let Some(wave) = &self.incident {
-            phases.par_iter_mut().zip(wave).for_each(|(phase, wave)| *phase -= wave.im.atan2(wave.re));
+            phases.par_iter_mut().zip(wave).for_each(|(phase, wave)| *phase -= wave.arg());
         }
         if let Some(range) = self.range {
             phases.par_iter_mut().for_each(|phase| *phase = range.nearest(*phase));

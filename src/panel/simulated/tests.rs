@@ -184,21 +184,21 @@ fn crosstalk_blurs_the_phase_by_an_error_function() {
 fn a_correction_undoes_the_bend_and_is_not_applied_twice() {
     let profile = panel(40, 30, 1.0, 0.0, turn());
     let grid = profile.grid().expect("grid");
-    let bend: Vec<f32> = (0..grid.len())
+    let error: Vec<f32> = (0..grid.len())
         .map(|i| (2.0 * TAU * ((grid.x(i % 40) / 2e-4).powi(2) + grid.y(i / 40) / 3e-4)) as f32)
         .collect();
-    let bend = Wavefront::new("bend", 40, 30, Some(WAVELENGTH), bend).expect("bend");
+    let error = Wavefront::new("error", 40, 30, Some(WAVELENGTH), error).expect("wavefront");
     let pattern = PhasePattern::new(grid, WAVELENGTH, vec![1.0; grid.len()]).expect("pattern");
     let plain = drive(&Pattern::Phase(pattern.clone()), None, &profile).expect("drive").frame;
-    let correction = bend.clone().conjugate();
+    let correction = error.clone().conjugate();
     let direct = drive(&Pattern::Phase(pattern), Some(&correction), &profile).expect("drive").frame;
     let later = correct(&plain, &correction).expect("correct").frame;
     for frame in [&direct, &later] {
-        let seen = simulated(frame, 1, Faults { bend: Some(bend.clone()), ..Faults::default() });
+        let seen = simulated(frame, 1, Faults { wavefront_error: Some(error.clone()), ..Faults::default() });
         // Each quantisation misses by at most half a level.
         let worst = seen.samples.iter().map(|u| (u - Complex32::from_polar(1.0, 1.0)).norm()).fold(0.0, f32::max);
         assert!(worst < 1.01 * TAU as f32 / 256.0, "{worst}");
-        assert_eq!(frame.metadata.applied.correction.as_deref(), Some("bend"));
+        assert_eq!(frame.metadata.applied.correction.as_deref(), Some("error"));
     }
     assert!(correct(&later, &correction).expect_err("twice").to_string().contains("already"));
     let small = Wavefront::new("small", 4, 3, Some(WAVELENGTH), vec![0.0; 12]).expect("small");

@@ -3,13 +3,14 @@
 //! | card | what is right | what an error looks like |
 //! |---|---|---|
 //! | `half-turn` | of nine fields the fifth, between two bars, is the darkest in the undiffracted light | another one is: its level for 2π is the true one |
-//! | `lenses` | a square lattice of sharp spots at the distance | spots that are blurred or out of line: the panel is bent there |
+//! | `lenses` | a square lattice of sharp spots at the distance | spots that are blurred or out of line: the panel is not flat there |
 //! | `letters` | an upright F left of an upright L, at the distance | mirrored, turned over, or seen at −distance: flips, sign of the phase |
 //!
 //! *Half turn*: a checkerboard of phases 0 and δ sends cos²(δ/2) of its light straight on, none at δ = π. The fields
 //! ask for δ = π·(0.8 … 1.2). *Lenses*: pieces of the panel, each a lens of its own (Shack & Platt, *J. Opt. Soc. Am.* 61,
 //! 656 (1971), with the panel as lens array). *Letters*: points of light in front of the panel.
 
+use super::series::{Entry, FrameSeries};
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::hologram::{self, HologramSettings};
@@ -31,11 +32,21 @@ pub struct Card {
     pub look_for: String,
 }
 
+/// The cards as frames to show.
+pub fn card_frames(cards: &[Card]) -> FrameSeries<'_> {
+    let make = |index: usize| {
+        let card = &cards[index];
+        let cells = format!("\"{}\"", card.look_for.replace('"', "'"));
+        Ok(Entry { name: format!("{}.png", card.name), cells, frame: card.frame.clone() })
+    };
+    FrameSeries::new("look for", cards.len(), make)
+}
+
 /// Fields of the half-turn card.
-pub const FIELDS: usize = 9;
+const FIELDS: usize = 9;
 
 /// δ/π of each field of the half-turn card.
-pub fn half_turn_factor(field: usize) -> f64 {
+fn half_turn_factor(field: usize) -> f64 {
     0.8 + 0.4 * field as f64 / (FIELDS - 1) as f64
 }
 
@@ -81,7 +92,7 @@ pub fn cards(
             frame: shown(lenses(grid, wavelength, distance)?, "lenses")?,
             look_for: format!(
                 "on a screen {far} in front of the panel: a square lattice of sharp spots; out of line or blurred where the \
-                 panel is bent"
+                 panel is not flat"
             ),
         },
         Card {
@@ -116,7 +127,7 @@ fn half_turn(grid: Grid) -> Vec<f32> {
 
 /// Square lenses side by side.
 fn lenses(grid: Grid, wavelength: f64, distance: f64) -> Result<Vec<f32>> {
-    // As large as the pixels can bend to that distance, and no fewer than four along the shorter side.
+    // As large as the pixels can focus to that distance, and no fewer than four along the shorter side.
     let pitch = grid.pitch_x.max(grid.pitch_y);
     let steepest = 0.8 * wavelength * distance / pitch;
     let side = steepest.min(grid.extent_x().min(grid.extent_y()) / 4.0);
@@ -168,7 +179,7 @@ fn letters(grid: Grid, wavelength: f64, distance: f64, progress: &Progress) -> R
     }
     let plan = hologram::plan(&points, &grid, wavelength, &HologramSettings::default())?;
     let field = hologram::compute(&points, &grid, wavelength, &plan, progress)?.field;
-    Ok(field.samples.iter().map(|u| u.im.atan2(u.re)).collect())
+    Ok(field.samples.iter().map(|u| u.arg()).collect())
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
-//! Hidden curves and bends are found again on the simulated panel.
+//! Hidden curves and wavefront errors are found again on the simulated panel.
 
-use super::curve::{Order, Power, Region};
 use super::*;
 use crate::field::{Complex32, Grid};
 use crate::panel::{Curve, Faults, PanelProfile, Response, Simulation, Wavefront, correct, simulate};
@@ -24,17 +23,21 @@ fn normal(random: &mut Random) -> f64 {
     (0..12).map(|_| random.uniform()).sum::<f64>() - 6.0
 }
 
-/// A curve of `range` rad with a random smooth bend of five per cent of it at its greatest.
+fn grating(level: u16, stripe: usize) -> Grating {
+    Grating { fixed: 0, level, stripe, region: None }
+}
+
+/// A curve of `range` rad with a random smooth deviation of five per cent of it at its greatest.
 fn hidden(range: f64, seed: u64) -> Vec<f64> {
     let mut random = Random::new(seed, 7);
     let waves: Vec<f64> = (1..=3).map(|k| (2.0 * random.uniform() - 1.0) / f64::from(k)).collect();
-    let bend = |x: f64| waves.iter().zip(1..).map(|(a, k)| a * (PI * f64::from(k) * x).sin()).sum::<f64>();
-    let greatest = (0..256).map(|l| bend(f64::from(l) / 255.0).abs()).fold(0.0, f64::max);
-    (0..256).map(|level| f64::from(level) / 255.0).map(|x| range * (x + 0.05 * bend(x) / greatest)).collect()
+    let deviation = |x: f64| waves.iter().zip(1..).map(|(a, k)| a * (PI * f64::from(k) * x).sin()).sum::<f64>();
+    let greatest = (0..256).map(|l| deviation(f64::from(l) / 255.0).abs()).fold(0.0, f64::max);
+    (0..256).map(|level| f64::from(level) / 255.0).map(|x| range * (x + 0.05 * deviation(x) / greatest)).collect()
 }
 
 #[test]
-fn a_bent_curve_is_found_again_from_noisy_powers() {
+fn a_curved_response_is_found_again_from_noisy_powers() {
     let profile = panel(32, 4);
     for (range, order) in
         [(2.1 * PI, Order::First), (2.1 * PI, Order::Zero), (1.6 * PI, Order::First), (5.2 * PI, Order::First)]
@@ -44,7 +47,7 @@ fn a_bent_curve_is_found_again_from_noisy_powers() {
         let mut random = Random::new(3, 0);
         let powers: Vec<(u16, f64)> = (0..256u16)
             .map(|level| {
-                let frame = sweep_frame(&profile, WAVELENGTH, (0, level), 4, None).expect("frame");
+                let frame = grating_frame(&profile, WAVELENGTH, &grating(level, 4)).expect("frame");
                 let settings = Simulation {
                     faults: Faults { response: response.clone(), ..Faults::default() },
                     ..Simulation::default()
@@ -107,50 +110,52 @@ fn sweeps_that_tell_nothing_are_refused() {
         let error = read_powers(&file, 256).expect_err(word).to_string();
         assert!(error.contains(word), "{error}");
     }
-    assert!(sweep_frame(&panel(8, 4), WAVELENGTH, (0, 300), 2, None).is_err());
+    assert!(grating_frame(&panel(8, 4), WAVELENGTH, &grating(300, 2)).is_err());
     let outside = Some(Region { place: (2, 0), parts: (2, 1) });
-    assert!(sweep_frame(&panel(8, 4), WAVELENGTH, (0, 3), 2, outside).is_err());
+    assert!(grating_frame(&panel(8, 4), WAVELENGTH, &Grating { region: outside, ..grating(3, 2) }).is_err());
 }
 
 #[test]
-fn two_waves_of_bend_are_found_from_stepped_interferograms_and_corrected() {
+fn two_waves_of_error_are_found_from_stepped_interferograms_and_corrected() {
     let (width, height) = (48, 40);
     let profile = PanelProfile { fill_factor: 1.0, ..panel(width, height) };
     let grid = profile.grid().expect("grid");
     // Tilt, defocus, astigmatism and coma: two waves from lowest to highest.
-    let bend = zernike::wavefront(grid, WAVELENGTH, &[0.0, 0.6, -0.3, 3.3, 0.8, 0.0, 0.4, -0.6], 2.5e-4, "bend")
-        .expect("bend");
-    let span = bend.phase.iter().fold((f32::MAX, f32::MIN), |(l, h), &p| (l.min(p), h.max(p)));
+    let error = zernike::wavefront(grid, WAVELENGTH, &[0.0, 0.6, -0.3, 3.3, 0.8, 0.0, 0.4, -0.6], 2.5e-4, "error")
+        .expect("wavefront");
+    let span = error.phase.iter().fold((f32::MAX, f32::MIN), |(l, h), &p| (l.min(p), h.max(p)));
     assert!(span.1 - span.0 > 2.0 * TAU as f32, "{span:?}");
-    let settings =
-        Simulation { faults: Faults { bend: Some(bend.clone()), ..Faults::default() }, ..Simulation::default() };
+    let settings = Simulation {
+        faults: Faults { wavefront_error: Some(error.clone()), ..Faults::default() },
+        ..Simulation::default()
+    };
     let mut random = Random::new(8, 0);
     let pictures: Vec<Vec<f32>> = step_frames(&profile, WAVELENGTH, 5)
         .expect("frames")
-        .iter()
+        .frames()
         .map(|frame| {
-            let seen = simulate(frame, &settings, &Progress::new()).expect("simulate");
+            let seen = simulate(&frame.expect("frame"), &settings, &Progress::new()).expect("simulate");
             let light =
                 |u: &Complex32| (u + Complex32::new(0.8, 0.0)).norm_sqr() * (1.0 + 0.01 * normal(&mut random) as f32);
             seen.samples.iter().map(light).collect()
         })
         .collect();
-    let found = bend_from_steps(&pictures, width, height, WAVELENGTH, "measured").expect("bend");
+    let found = wavefront_from_steps(&pictures, width, height, WAVELENGTH, "measured").expect("wavefront");
     let miss = |a: f32, b: f32| (f64::from(a - b) + PI).rem_euclid(TAU) - PI;
-    let squares: f64 = found.phase.iter().zip(&bend.phase).map(|(a, b)| miss(*a, *b).powi(2)).sum();
+    let squares: f64 = found.phase.iter().zip(&error.phase).map(|(a, b)| miss(*a, *b).powi(2)).sum();
     let rms = (squares / grid.len() as f64).sqrt();
     assert!(rms < TAU / 50.0, "{rms} rad");
     // After correction a flat panel sends within 1 % of its light straight on.
-    let flat = step_frames(&profile, WAVELENGTH, 3).expect("frames").remove(0);
+    let flat = step_frames(&profile, WAVELENGTH, 3).expect("frames").frames().next().expect("first").expect("frame");
     let corrected = correct(&flat, &found.conjugate()).expect("correct").frame;
     let seen = simulate(&corrected, &settings, &Progress::new()).expect("simulate");
     let sum: Complex32 = seen.samples.iter().sum();
     let efficiency = f64::from(sum.norm_sqr()) / (grid.len() as f64).powi(2);
     assert!(efficiency > 0.99, "{efficiency}");
-    assert!(bend_from_steps(&pictures[..2], width, height, WAVELENGTH, "x").is_err());
-    assert!(bend_from_steps(&pictures, height, height, WAVELENGTH, "x").is_err());
+    assert!(wavefront_from_steps(&pictures[..2], width, height, WAVELENGTH, "x").is_err());
+    assert!(wavefront_from_steps(&pictures, height, height, WAVELENGTH, "x").is_err());
     let same = vec![vec![1.0; grid.len()]; 4];
-    assert!(bend_from_steps(&same, width, height, WAVELENGTH, "x").is_err());
+    assert!(wavefront_from_steps(&same, width, height, WAVELENGTH, "x").is_err());
 }
 
 #[test]

@@ -5,29 +5,14 @@
 //! sends, A the laser's power. The curve is a polynomial of the level; it, A and B are fitted to all powers together
 //! (Levenberg & Marquardt), starting from the phases that the maxima and minima of the sweep tell.
 
+use super::profile_name;
+use super::sweep::{Order, Power, read_powers};
 use crate::error::{Error, Result};
-use crate::names::{Name, Named};
-use crate::panel::vendor::text;
-use crate::panel::{Curve, Frame, PanelProfile};
+use crate::panel::{Curve, PanelProfile};
+use crate::units::show_length;
+use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
-
-/// Which order the detector saw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
-    /// The undiffracted light: brightest where the levels agree.
-    Zero,
-    /// A first order: dark where the levels agree.
-    First,
-}
-
-impl Named for Order {
-    const KIND: &'static str = "order";
-    const NAMES: &'static [Name<Self>] = &[
-        ("first", || Self::First, "the detector saw a first order of the gratings"),
-        ("zero", || Self::Zero, "the detector saw the undiffracted light"),
-    ];
-}
 
 /// A fitted curve.
 #[derive(Clone, Debug)]
@@ -44,123 +29,107 @@ pub struct CurveFit {
     pub degree: usize,
 }
 
-/// A part of a panel whose phase is measured by itself: `place` of `parts`, counted in columns and rows from the upper left.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Region {
-    /// Column and row of the region.
-    pub place: (usize, usize),
-    /// Number of regions side by side and one above the other.
-    pub parts: (usize, usize),
+/// What a measured curve is, and how sure.
+#[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
+pub struct CurveReport {
+    /// Number of powers.
+    pub powers: usize,
+    /// Order in which they were measured.
+    pub order: Order,
+    /// Regions side by side and one above the other, where each has a curve of its own.
+    pub regions: Option<[usize; 2]>,
+    /// Degree of the polynomial.
+    pub degree: usize,
+    /// Standard deviation of the phase at each level [rad].
+    pub uncertainty: Vec<f64>,
+    /// Root mean square of it over the levels [rad].
+    pub uncertainty_rms: f64,
+    /// Largest of it [rad].
+    #[serde(skip)]
+    pub uncertainty_most: f64,
+    /// Root mean square of measured − fitted power, as share of the modulated power.
+    pub residual: f64,
+    /// Range of the curve [rad].
+    pub range: f64,
+    /// Levels that one turn spans, by the mean slope.
+    pub levels_for_2pi: Option<f64>,
 }
 
-/// The grating to show: stripes of `stripe` columns at level `fixed` and at `level`, over the whole panel or one region of
-/// it; the rest then stands at `fixed` and sends nothing into the grating's orders.
+/// A profile with a curve that was measured.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct MeasuredCurve {
+    /// The profile.
+    pub profile: PanelProfile,
+    /// The curve in figures.
+    pub report: CurveReport,
+    /// What the written profile says of it.
+    remarks: Vec<String>,
+}
+
+/// The curve that a file of measured powers tells, put into the profile.
 ///
 /// # Errors
-/// [`Error::Parameter`] for levels that the panel does not have, stripes without width, a region outside the panel.
-pub fn sweep_frame(
+/// As [`read_powers`] and [`fit`].
+pub fn measure_curve(
     profile: &PanelProfile,
     wavelength: f64,
-    (fixed, level): (u16, u16),
-    stripe: usize,
-    region: Option<Region>,
-) -> Result<Frame> {
-    if stripe == 0 {
-        return Err(Error::parameter("stripe", "0 columns; take at least one, a few against crosstalk"));
-    }
-    let (width, height) = (profile.width, profile.height);
-    let Region { place, parts } = region.unwrap_or(Region { place: (0, 0), parts: (1, 1) });
-    if place.0 >= parts.0 || place.1 >= parts.1 || parts.0 > width || parts.1 > height {
-        return Err(Error::parameter("regions", format!("region {place:?} of {parts:?} on {width}×{height} pixels")));
-    }
-    let inside = |at: usize, size: usize, place: usize, parts: usize| at * parts / size == place;
-    let row = |bright: bool| -> Vec<u16> {
-        let grating = |x: usize| bright && inside(x, width, place.0, parts.0) && !(x / stripe).is_multiple_of(2);
-        (0..width).map(|x| if grating(x) { level } else { fixed }).collect()
+    powers: &Path,
+    order: Order,
+    degree: Option<usize>,
+) -> Result<MeasuredCurve> {
+    let measured = read_powers(powers, profile.levels())?;
+    let CurveFit { curve, uncertainty, residual, range, degree } =
+        fit(&measured, profile.levels(), order, degree, powers)?;
+    let uncertainty_most = uncertainty.iter().fold(0.0, |a: f64, &b| a.max(b));
+    let uncertainty_rms = (uncertainty.iter().map(|u| u * u).sum::<f64>() / uncertainty.len() as f64).sqrt();
+    let mut remarks = vec![
+        format!("{} with its curve at {} measured: {}", profile.name, show_length(wavelength), powers.display()),
+        format!(
+            "uncertainty {uncertainty_rms:.4} rad RMS over the levels, {uncertainty_most:.4} rad at most; residual {residual:.4}"
+        ),
+    ];
+    let regions = match &curve {
+        Curve::Regional { columns, rows, .. } => Some([*columns, *rows]),
+        _ => None,
     };
-    let rows = [row(false), row(true)];
-    let levels = (0..height).flat_map(|y| &rows[usize::from(inside(y, height, place.1, parts.1))]).copied().collect();
-    let mut frame = Frame::new(profile, wavelength, levels)?;
-    frame.metadata.origin.notes = vec![format!("calibration grating: levels {fixed} and {level}, stripes of {stripe}")];
-    Ok(frame)
+    if let Some([columns, rows]) = regions {
+        remarks.push(format!("{columns} × {rows} regions, row by row from the upper left"));
+    }
+    let profile = profile.with_measured_curve(wavelength, curve);
+    let levels_for_2pi = profile.drive_curve(wavelength)?.0.levels_for_2pi();
+    let powers = measured.len();
+    let report = CurveReport {
+        powers,
+        order,
+        regions,
+        degree,
+        uncertainty,
+        uncertainty_rms,
+        uncertainty_most,
+        residual,
+        range,
+        levels_for_2pi,
+    };
+    Ok(MeasuredCurve { profile, report, remarks })
 }
 
-/// A measured power of the sweep.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Power {
-    /// Level of the grating's second stripes.
-    pub level: u16,
-    /// Column and row of the region that was measured, if not all of the panel.
-    pub region: Option<(usize, usize)>,
-    /// Power in any unit.
-    pub power: f64,
-}
-
-/// Reads measured powers: comma-separated lines `level,power` or, by region, `level,column,row,power`.
-///
-/// A head line names the columns, in any order, and may name others, which are passed over; so are lines that begin with
-/// `#`.
-///
-/// # Errors
-/// [`Error::Calibration`] with the line that is not right, or whose level the panel does not have.
-pub fn read_powers(path: &Path, levels: usize) -> Result<Vec<Power>> {
-    let text = text(path)?;
-    let mut columns: Vec<String> = Vec::new();
-    let mut powers: Vec<Power> = Vec::new();
-    for (number, line) in text.lines().enumerate() {
-        let line = line.trim().trim_start_matches('\u{feff}');
-        if line.is_empty() || line.starts_with('#') {
-            continue;
+impl MeasuredCurve {
+    /// Writes the profile, having proved that it is read back.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a name that does not end in `.toml`; [`Error::Io`].
+    pub fn write(&self, path: &Path) -> Result<()> {
+        profile_name(path)?;
+        // Files that the profile names are found beside it, wherever it was read from.
+        let mut profile = self.profile.clone();
+        for correction in &mut profile.corrections {
+            correction.file = std::path::absolute(&correction.file).map_err(Error::io(&correction.file))?;
         }
-        let refuse = |what: String| Err(Error::calibration(path, format!("line {}: {what}", number + 1)));
-        let words: Vec<&str> = line.split([',', ';', '\t']).map(str::trim).collect();
-        if columns.is_empty() {
-            let names: Vec<String> = words.iter().map(|word| word.to_lowercase()).collect();
-            if names.iter().any(|name| name == "level") && names.iter().any(|name| name == "power") {
-                columns = names;
-                continue;
-            }
-            columns = match words.len() {
-                4 => vec!["level".into(), "column".into(), "row".into(), "power".into()],
-                _ => vec!["level".into(), "power".into()],
-            };
-        }
-        if words.len() != columns.len() {
-            return refuse(format!(
-                "`{line}` has {} entries, {} are due: {}",
-                words.len(),
-                columns.len(),
-                columns.join(",")
-            ));
-        }
-        let word = |name: &str| columns.iter().position(|column| column == name).map(|at| words[at]);
-        let whole =
-            |name: &str| word(name).filter(|w| !w.is_empty()).map(str::parse::<usize>).transpose().map_err(drop);
-        let power = word("power").unwrap_or_default();
-        let (Ok(Some(level)), Ok(column), Ok(row)) = (whole("level"), whole("column"), whole("row")) else {
-            return refuse(format!("`{line}` does not hold whole numbers for level, column and row"));
-        };
-        let Some(power) = power.parse::<f64>().ok().filter(|p| p.is_finite()) else {
-            let what = if power.is_empty() { "the power is missing".into() } else { format!("`{power}` is no power") };
-            return refuse(what);
-        };
-        if level >= levels {
-            return refuse(format!("level {level}; the panel has 0 … {}", levels - 1));
-        }
-        let region = match (column, row) {
-            (Some(column), Some(row)) => Some((column, row)),
-            (None, None) => None,
-            _ => return refuse("a region has a column and a row".into()),
-        };
-        if powers.first().is_some_and(|first| first.region.is_some() != region.is_some()) {
-            return refuse("some powers are of regions, some of the whole panel".into());
-        }
-        powers.push(Power { level: level as u16, region, power });
+        PanelProfile::parse(&profile.to_toml(&self.remarks)?, path)?;
+        profile.write(path, &self.remarks)
     }
-    if powers.is_empty() {
-        return Err(Error::calibration(path, "holds no powers"));
-    }
-    Ok(powers)
 }
 
 /// Fits one curve, or where the powers are of regions one for each.
