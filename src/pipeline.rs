@@ -1,236 +1,187 @@
-//! The whole way, on one screen: a scene becomes points, points a field, a field a frame, a frame light again.
+//! The whole way, on one screen: a scene becomes points, points fields, fields frames, frames light, and light pictures.
 //!
-//! Each function is one arrow of the picture in the crate's documentation; [`run`] walks them all.
+//! Each function is one arrow of the picture in the crate's documentation; [`run`] walks them all, and so does every
+//! command, live view and animation. One laser, three lasers and sub-frames differ only in their list of [`exposures`].
 
-use crate::encode::{self, EncodeSettings, Encoded};
-use crate::error::{Error, Result};
-use crate::field::{Complex32, Field, Grid};
+use crate::encode::{self, EncodeOptions, Encoded};
+use crate::error::Result;
+use crate::field::{Complex32, Field};
 use crate::hologram::{self, Computed, HologramSettings};
-use crate::illumination::{Illumination, IlluminationReport, IlluminationSettings};
 use crate::panel::simulated::{self, Simulation};
-use crate::panel::{Frame, PanelProfile};
-use crate::points::budget::{Budget, Rays};
-use crate::points::colour::{Gamut, Lasers};
-use crate::points::placement::{self, Phase, SequenceAnchors, WorldPoint};
-use crate::points::trace::{self, TraceReport, TraceSettings};
-use crate::points::{self, Channel, Placed, Placement, PointCloud, PointSource, SceneView, WhiteLevel, WhitePoint};
+use crate::panel::{Frame, Origin, Setup};
+use crate::points::{Channel, Exposure, LitScene, PointCloud, ScenePoints, SceneSettings, Share, SubFrames};
 use crate::progress::Progress;
-use crate::propagation::Aperture;
-use crate::reconstruction::ViewSettings;
-use crate::scene::{Camera, SceneBvh, gltf};
+use crate::reconstruction::{ExposureLight, Gallery, Light, Target, ViewSettings};
 use glam::DVec3;
 use std::path::Path;
 
-/// How a scene becomes points.
-#[derive(Clone, Debug)]
-pub struct SceneSettings {
-    /// Camera, animation.
-    pub load: gltf::LoadOptions,
-    /// Radiosity and direct light.
-    pub illumination: IlluminationSettings,
-    /// Rays.
-    pub trace: TraceSettings,
-    /// How many points; then only the shape of the rays' grid is taken from `trace`. `None` casts its rays as they are.
-    pub points: Option<Budget>,
-    /// Where the scene stands before the panel.
-    pub placement: Placement,
-    /// Initial phase of the points.
-    pub phase: Phase,
-    /// What is done with light brighter than a picture's white.
-    pub white: WhitePoint,
-    /// What a sequence of frames keeps fixed.
-    pub anchors: SequenceAnchors,
+/// How each step is done.
+#[derive(Clone, Debug, Default)]
+pub struct Settings {
+    /// Scene → points.
+    pub scene: SceneSettings,
+    /// Which light of a coloured cloud one laser shows.
+    pub channel: Channel,
+    /// Several frames for one picture, in one laser.
+    pub sub_frames: Option<SubFrames>,
+    /// Points → fields.
+    pub hologram: HologramSettings,
+    /// Fields → frames.
+    pub encode: EncodeOptions,
+    /// Frames → light.
+    pub bench: Bench,
 }
 
-impl Default for SceneSettings {
-    fn default() -> Self {
-        Self {
-            load: gltf::LoadOptions::default(),
-            illumination: IlluminationSettings::default(),
-            trace: TraceSettings::default(),
-            points: None,
-            placement: Placement::default(),
-            phase: Phase::Random { seed: 1 },
-            white: WhitePoint::Unlimited,
-            anchors: SequenceAnchors::default(),
-        }
-    }
-}
-
-/// A scene's light as points, and what an eye sees of it.
-#[derive(Clone, Debug)]
-pub struct Lit {
-    /// The points before the panel.
-    pub placed: Placed,
-    /// The same points where the camera's rays put them [m].
-    pub world: Vec<WorldPoint>,
-    /// What the viewer should see.
-    pub view: SceneView,
-    /// What the radiosity took, and its energy.
-    pub illumination: IlluminationReport,
-    /// What the rays took.
-    pub trace: TraceReport,
-    /// What a budget of points chose, if there was one.
-    pub rays: Option<Rays>,
-    /// White, and what is brighter.
-    pub white: WhiteLevel,
-    /// What had to be assumed.
-    pub warnings: Vec<String>,
+/// The simulated bench: the panel's faults, and the stop behind it.
+#[derive(Clone, Debug, Default)]
+pub struct Bench {
+    /// What the panel does beside what it should.
+    pub simulation: Simulation,
+    /// Angle about the axis that a stop in the Fourier plane of the encoding's relay blocks [rad].
+    pub zero_order_stop: f64,
 }
 
 /// glTF → light on surfaces → points before the panel.
-pub fn light(
-    scene: &Path,
-    settings: &SceneSettings,
-    panel: &Grid,
-    wavelength: f64,
-    progress: &Progress,
-) -> Result<Lit> {
-    progress.start("scene", 0);
-    let loaded = gltf::load(scene, &settings.load)?;
-    let camera = loaded.scene.cameras.first().ok_or_else(|| Error::input(scene, "has no camera"))?;
-    let bvh = SceneBvh::new(loaded.scene.clone());
-    let illumination = Illumination::new(bvh, settings.illumination, progress)?;
-    seen(scene, (&loaded, camera), &illumination, settings, (panel, wavelength), progress)
+///
+/// # Errors
+/// As [`LitScene::load`] and [`LitScene::points`].
+pub fn points(scene: &Path, settings: &SceneSettings, setup: &Setup, progress: &Progress) -> Result<ScenePoints> {
+    let lit = LitScene::load(scene, settings, progress)?;
+    lit.points(lit.camera(), settings, &setup.grid, setup.wavelength, progress)
 }
 
-/// Light on surfaces → points before the panel, for a camera; `scene` stands in errors.
-pub fn seen(
-    scene: &Path,
-    (loaded, camera): (&gltf::Loaded, &Camera),
-    illumination: &Illumination,
-    settings: &SceneSettings,
-    (panel, wavelength): (&Grid, f64),
-    progress: &Progress,
-) -> Result<Lit> {
-    let aspect = f64::from(settings.trace.width) / f64::from(settings.trace.height);
-    let placing = settings.placement.prepare_for(&loaded.scene, &settings.anchors, camera, aspect, panel)?;
-    let (traced, rays) = match settings.points {
-        None => (trace::trace(illumination, &placing.camera, &settings.trace, progress)?, None),
-        Some(budget) => budget.trace(illumination, &settings.trace, &placing, panel, wavelength, progress)?,
-    };
-    if traced.points.is_empty() {
-        let what = if illumination.is_dark() {
-            "its lights give no light; raise their intensity or emission"
-        } else {
-            "no ray of its camera meets light; look at the camera and the lights"
-        };
-        return Err(Error::input(scene, what));
+/// The patterns that together make one picture on this bench: one, one for each of three lasers, or the sub-frames. Where
+/// the cloud's phases are those of paths to an eye, it stands at `path_eye`.
+pub fn exposures(setup: &Setup, settings: &Settings, path_eye: Option<DVec3>) -> Vec<Exposure> {
+    match (&setup.lasers, settings.sub_frames) {
+        (Some(lasers), _) => Exposure::of_lasers(lasers, path_eye),
+        (None, Some(frames)) => Exposure::of_sub_frames(frames, settings.channel, setup.wavelength),
+        (None, None) => vec![Exposure { wavelength: setup.wavelength, share: Share::Whole(settings.channel) }],
     }
-    let mut world = traced.world_points();
-    let white = settings.white.apply(&mut world, &traced.picture)?;
-    let placed = points::place(&world, &placing, settings.phase, panel, wavelength);
-    let view = SceneView::new(&traced, &placed, placing);
-    let warnings = loaded.warnings.iter().map(ToString::to_string).collect();
-    Ok(Lit { placed, world, view, illumination: *illumination.report(), trace: traced.report, rays, white, warnings })
 }
 
-/// Points → field on the panel, by the engine that the planner chooses.
+/// Points → field of one exposure on the panel, by the engine that the planner chooses; `None` for one of three lasers
+/// that has no light.
+///
+/// # Errors
+/// As [`hologram::plan`] and [`hologram::compute`].
 pub fn field(
     cloud: &PointCloud,
-    channel: Channel,
-    panel: &Grid,
-    wavelength: f64,
+    exposure: &Exposure,
+    setup: &Setup,
     settings: &HologramSettings,
     progress: &Progress,
-) -> Result<Computed> {
-    field_of(&cloud.channel(channel), panel, wavelength, settings, progress)
+) -> Result<Option<Computed>> {
+    let points = exposure.points(cloud);
+    if matches!(exposure.share, Share::Laser { .. }) && points.iter().all(|p| p.amplitude == 0.0) {
+        return Ok(None);
+    }
+    let plan = hologram::plan(&points, &setup.grid, exposure.wavelength, settings)?;
+    hologram::compute(&points, &setup.grid, exposure.wavelength, &plan, progress).map(Some)
 }
 
-/// The same for points of one colour.
-pub fn field_of(
-    points: &[PointSource],
-    panel: &Grid,
-    wavelength: f64,
-    settings: &HologramSettings,
+/// Field → frame of drive levels; `origin` goes into its metadata, and its depths tell iterations where to look.
+///
+/// # Errors
+/// As [`EncodeOptions::settings`] and [`encode::encode`].
+pub fn frame(
+    field: &Field,
+    setup: &Setup,
+    options: &EncodeOptions,
+    origin: Origin,
     progress: &Progress,
-) -> Result<Computed> {
-    let plan = hologram::plan(points, panel, wavelength, settings)?;
-    hologram::compute(points, panel, wavelength, &plan, progress)
-}
-
-/// A cloud's fields in the light of three lasers.
-#[derive(Clone, Debug)]
-pub struct ColorFields {
-    /// Fields in red, green and blue; a laser without any light has none.
-    pub computed: [Option<Computed>; 3],
-    /// Light that the lasers cannot make.
-    pub gamut: Gamut,
-}
-
-/// Points → three fields on the panel, one for each laser. Where phases are those of paths to an eye, it stands at
-/// `path_eye`: they differ from laser to laser.
-pub fn color_fields(
-    cloud: &PointCloud,
-    lasers: &Lasers,
-    path_eye: Option<DVec3>,
-    panel: &Grid,
-    settings: &HologramSettings,
-    progress: &Progress,
-) -> Result<ColorFields> {
-    let (each, gamut) = lasers.points(cloud);
-    let one = |(mut points, wavelength): (Vec<PointSource>, f64)| {
-        if let Some(eye) = path_eye {
-            points.iter_mut().for_each(|p| p.phase = placement::path_phase((eye - p.position).length(), wavelength));
-        }
-        if points.iter().all(|p| p.amplitude == 0.0) {
-            return Ok(None);
-        }
-        field_of(&points, panel, wavelength, settings, progress).map(Some)
-    };
-    let [red, green, blue] = each;
-    let [long, middle, short] = lasers.wavelengths();
-    Ok(ColorFields { computed: [one((red, long))?, one((green, middle))?, one((blue, short))?], gamut })
-}
-
-/// Field → frame of drive levels for a panel.
-pub fn frame(field: &Field, panel: &PanelProfile, settings: &EncodeSettings, progress: &Progress) -> Result<Encoded> {
-    encode::encode(field, panel, settings, progress)
+) -> Result<Encoded> {
+    let (settings, warnings) = options.settings(setup, field.wavelength, origin.depth)?;
+    let mut encoded = encode::encode(field, &setup.profile, &settings, progress)?;
+    encoded.report.warnings.splice(0..0, warnings);
+    encoded.frame.metadata.origin = origin;
+    Ok(encoded)
 }
 
 /// Frame → the object's field behind the simulated panel, and the stop that keeps its other orders out.
 ///
 /// The encoding's scale is divided out, so that intensities are those of the field that was encoded.
-pub fn simulated_light(frame: &Frame, settings: &Simulation, progress: &Progress) -> Result<(Field, ViewSettings)> {
-    let mut field = simulated::simulate(frame, settings, progress)?;
-    let mut view = ViewSettings::default();
+///
+/// # Errors
+/// As [`simulated::simulate`].
+pub fn light(frame: &Frame, bench: &Bench, progress: &Progress) -> Result<ExposureLight> {
+    let mut field = simulated::simulate(frame, &bench.simulation, progress)?;
+    let mut settings = ViewSettings::default();
     if let Some(encoding) = &frame.metadata.encoding {
-        view.aperture = encoding.aperture;
+        settings.aperture = encoding.aperture;
+        settings.block_zero_order(bench.zero_order_stop, field.wavelength);
         if encoding.scale.is_finite() && encoding.scale > 0.0 {
             let gain = (1.0 / encoding.scale) as f32;
             field.samples.iter_mut().for_each(|u: &mut Complex32| *u *= gain);
         }
     }
-    Ok((field, view))
+    Ok(ExposureLight { field, settings, laser: 0 })
+}
+
+/// Light → the pictures that a person looks at: of a scene, or of whatever stands at the content's depths.
+///
+/// Frames are those of three lasers in their order, `None` for a dark one; without lasers they are sub-frames, of which a
+/// slow eye sees the mean: their fields are made one after another, since many do not fit the memory.
+///
+/// # Errors
+/// As [`light`] and [`Gallery::of`].
+pub fn pictures(
+    frames: &[Option<&Frame>],
+    setup: &Setup,
+    target: &Target,
+    bench: &Bench,
+    progress: &Progress,
+) -> Result<Gallery> {
+    let together = if setup.lasers.is_some() { frames.len() } else { 1 };
+    let galleries = frames.chunks(together.max(1)).map(|frames| {
+        let lit = frames.iter().enumerate().filter_map(|(laser, frame)| Some((laser, (*frame)?)));
+        let exposures = lit.map(|(laser, frame)| Ok(ExposureLight { laser, ..light(frame, bench, progress)? }));
+        let light = Light { lasers: setup.lasers, exposures: exposures.collect::<Result<_>>()? };
+        Gallery::of(&light, target, progress)
+    });
+    Gallery::mean(galleries, frames.len() / together.max(1))
+}
+
+/// One exposure's way from field to frame.
+#[derive(Clone, Debug)]
+pub struct Hologram {
+    /// Its laser and its share of the points.
+    pub exposure: Exposure,
+    /// The field on the panel.
+    pub computed: Computed,
+    /// The frame for the panel.
+    pub encoded: Encoded,
 }
 
 /// What came out of the whole way.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// Points and picture.
-    pub lit: Lit,
-    /// Field on the panel.
-    pub computed: Computed,
-    /// Frame for the panel.
-    pub encoded: Encoded,
-    /// Field behind the simulated panel.
-    pub behind: Field,
-    /// Stop in the Fourier plane through which it is looked at.
-    pub aperture: Option<Aperture>,
+    /// The scene as points, and the traced picture.
+    pub points: ScenePoints,
+    /// Field and frame of each exposure; `None` for one of three lasers that has no light.
+    pub holograms: Vec<Option<Hologram>>,
+    /// What is seen of them on the simulated bench, with figures.
+    pub pictures: Gallery,
 }
 
-/// Scene → points → field → frame → light behind the simulated panel.
-pub fn run(
-    scene: &Path,
-    profile: &PanelProfile,
-    wavelength: f64,
-    settings: (&SceneSettings, &HologramSettings, &EncodeSettings),
-    progress: &Progress,
-) -> Result<Outcome> {
-    let grid = profile.grid()?;
-    let lit = light(scene, settings.0, &grid, wavelength, progress)?;
-    let computed = field(&lit.placed.cloud, Channel::Luminance, &grid, wavelength, settings.1, progress)?;
-    let encoded = frame(&computed.field, profile, settings.2, progress)?;
-    let (behind, view) = simulated_light(&encoded.frame, &Simulation::default(), progress)?;
-    Ok(Outcome { lit, computed, encoded, behind, aperture: view.aperture })
+/// Scene → points → fields → frames → light → pictures.
+///
+/// # Errors
+/// Those of the steps.
+pub fn run(scene: &Path, setup: &Setup, settings: &Settings, progress: &Progress) -> Result<Outcome> {
+    let points = points(scene, &settings.scene, setup, progress)?;
+    let cloud = &points.placed.cloud;
+    let content = points.content();
+    let origin = Origin { source: Some(scene.display().to_string()), depth: content.depth, ..Origin::default() };
+    let hologram = |exposure: Exposure| {
+        let Some(computed) = field(cloud, &exposure, setup, &settings.hologram, progress)? else { return Ok(None) };
+        let encoded = frame(&computed.field, setup, &settings.encode, origin.clone(), progress)?;
+        Ok(Some(Hologram { exposure, computed, encoded }))
+    };
+    let exposures = exposures(setup, settings, points.path_eye(settings.scene.phase));
+    let holograms = exposures.into_iter().map(hologram).collect::<Result<Vec<_>>>()?;
+    let frames: Vec<_> = holograms.iter().map(|h| h.as_ref().map(|h| &h.encoded.frame)).collect();
+    let target = Target::new(content, (settings.sub_frames.is_none()).then_some(&points));
+    let pictures = pictures(&frames, setup, &target, &settings.bench, progress)?;
+    Ok(Outcome { points, holograms, pictures })
 }

@@ -1,14 +1,11 @@
 //! Colour through the whole way: lamps of known colours come back as those colours, in their places.
 
 use glam::DVec3;
-use holodrive::encode::{EncodeSettings, Encoding};
 use holodrive::hologram::HologramSettings;
-use holodrive::names::Named;
-use holodrive::panel::PanelProfile;
-use holodrive::panel::simulated::Simulation;
-use holodrive::pipeline::{self, SceneSettings};
+use holodrive::panel::{Origin, PanelProfile, Setup};
+use holodrive::pipeline::{self, Bench, Settings};
 use holodrive::points::budget::Budget;
-use holodrive::points::colour::Lasers;
+use holodrive::points::{Channel, Exposure, PointCloud, PointSource, SceneSettings, Share};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::{ColorPicture, ExposureLight, Light, Reconstruction, View};
 use serde_json::json;
@@ -82,25 +79,22 @@ fn means(picture: &ColorPicture, white: f32) -> [[f32; 3]; 5] {
 fn lamps_come_back_in_their_colours_at_their_places() {
     let folder = tempfile::tempdir().expect("folder");
     let (scene, profile, progress) = (lamps(folder.path()), panel(), Progress::new());
-    let grid = profile.grid().expect("grid");
-    let lasers = Lasers::new([638e-9, 520e-9, 450e-9]).expect("lasers");
-    let mut settings = SceneSettings::default();
-    (settings.trace.width, settings.trace.height) = (200, 200);
-    let lit = pipeline::light(&scene, &settings, &grid, 450e-9, &progress).expect("light");
+    let setup = in_three_lasers(profile);
+    let mut settings = Settings::default();
+    (settings.scene.trace.width, settings.scene.trace.height) = (200, 200);
+    let lit = pipeline::points(&scene, &settings.scene, &setup, &progress).expect("points");
     let cloud = &lit.placed.cloud;
-    let fields =
-        pipeline::color_fields(cloud, &lasers, None, &grid, &HologramSettings::default(), &progress).expect("fields");
-    assert_eq!(fields.gamut.outside_points, 0);
-    let encode = EncodeSettings::new(Encoding::named("double-phase").expect("encoding"));
-    let mut behind = Light { lasers: Some(lasers), exposures: Vec::new() };
-    for (laser, (computed, wavelength)) in fields.computed.into_iter().zip(lasers.wavelengths()).enumerate() {
-        let computed = computed.expect("every laser has light");
-        assert_eq!(computed.field.wavelength, wavelength);
-        let frame = pipeline::frame(&computed.field, &profile, &encode, &progress).expect("frame").frame;
-        let (field, mut settings) =
-            pipeline::simulated_light(&frame, &Simulation::default(), &progress).expect("light");
-        settings.block_zero_order(0.05f64.to_radians(), wavelength);
-        behind.exposures.push(ExposureLight { field, settings, laser });
+    let exposures = pipeline::exposures(&setup, &settings, None);
+    assert_eq!(Exposure::gamut(&exposures, cloud).expect("lasers").outside_points, 0);
+    let bench = Bench { zero_order_stop: 0.05f64.to_radians(), ..Bench::default() };
+    let mut behind = Light { lasers: setup.lasers, exposures: Vec::new() };
+    for (laser, exposure) in exposures.iter().enumerate() {
+        let computed = pipeline::field(cloud, exposure, &setup, &settings.hologram, &progress).expect("field");
+        let field = computed.expect("every laser has light").field;
+        assert_eq!(field.wavelength, exposure.wavelength);
+        let encoded = pipeline::frame(&field, &setup, &settings.encode, Origin::default(), &progress);
+        let light = pipeline::light(&encoded.expect("frame").frame, &bench, &progress).expect("light");
+        behind.exposures.push(ExposureLight { laser, ..light });
     }
     let placing = &lit.view.placing;
     let target = ColorPicture { width: 200, height: 200, rgb: lit.view.picture.clone() };
@@ -133,44 +127,47 @@ fn lamps_come_back_in_their_colours_at_their_places() {
     check("eye", &seen, 0.25);
 }
 
+fn in_three_lasers(profile: PanelProfile) -> Setup {
+    Setup::new(profile, None).and_then(|setup| setup.in_color(Some([638e-9, 520e-9, 450e-9]))).expect("setup")
+}
+
 #[test]
 fn a_scene_of_one_colour_leaves_the_other_lasers_dark() {
-    let cloud = holodrive::points::PointCloud {
-        points: vec![holodrive::points::PointSource {
-            position: DVec3::new(0.0, 0.0, -0.1),
-            amplitude: 1.0,
-            phase: 0.0,
-        }],
+    let cloud = PointCloud {
+        points: vec![PointSource { position: DVec3::new(0.0, 0.0, -0.1), amplitude: 1.0, phase: 0.0 }],
         rgb: Some(vec![[0.0, 0.0, 1.0]]),
     };
-    let grid = panel().grid().expect("grid");
-    let lasers = Lasers::new([638e-9, 520e-9, 450e-9]).expect("lasers");
-    let fields = pipeline::color_fields(&cloud, &lasers, None, &grid, &HologramSettings::default(), &Progress::new())
-        .expect("fields");
+    let (setup, settings) = (in_three_lasers(panel()), Settings::default());
+    let exposures = pipeline::exposures(&setup, &settings, None);
+    let has_light = |exposure: &Exposure| {
+        let computed = pipeline::field(&cloud, exposure, &setup, &settings.hologram, &Progress::new());
+        computed.expect("field").is_some()
+    };
     // Rec.709's blue lies beyond the green–blue side of the triangle: moved onto it, it needs no red.
-    assert!(fields.computed[0].is_none() && fields.computed[1].is_some() && fields.computed[2].is_some());
-    assert_eq!(fields.gamut.outside_points, 1);
+    assert_eq!(exposures.iter().map(has_light).collect::<Vec<_>>(), [false, true, true]);
+    assert_eq!(Exposure::gamut(&exposures, &cloud).expect("lasers").outside_points, 1);
 }
 
 #[test]
 fn waves_reach_the_eye_in_step_in_each_laser() {
-    use holodrive::points::{Channel, PointCloud, PointSource};
     let eye = DVec3::new(0.0, 0.0, 0.6);
     let at = |x, z| PointSource { position: DVec3::new(x, 1e-4, z), amplitude: 1.0, phase: 0.0 };
     let cloud = PointCloud { points: vec![at(1e-4, -0.1), at(-2e-4, -0.12)], rgb: None };
-    let grid = panel().grid().expect("grid");
-    let lasers = Lasers::new([638e-9, 520e-9, 450e-9]).expect("lasers");
+    let setup = in_three_lasers(panel());
     let (settings, progress) = (HologramSettings::default(), Progress::new());
-    let fields = pipeline::color_fields(&cloud, &lasers, Some(eye), &grid, &settings, &progress).expect("fields");
-    for (computed, wavelength) in fields.computed.iter().zip(lasers.wavelengths()) {
+    for exposure in pipeline::exposures(&setup, &Settings::default(), Some(eye)) {
+        let wavelength = exposure.wavelength;
         let mut own = cloud.clone();
         for point in &mut own.points {
             // −k·distance, whole turns left out.
             point.phase = -std::f64::consts::TAU * (((eye - point.position).length() / wavelength) % 1.0);
         }
-        let expected =
-            pipeline::field(&own, Channel::Luminance, &grid, wavelength, &settings, &progress).expect("field").field;
-        let found = &computed.as_ref().expect("light").field;
+        let field = |cloud: &PointCloud, exposure: &Exposure| {
+            let computed = pipeline::field(cloud, exposure, &setup, &settings, &progress).expect("field");
+            computed.expect("light").field
+        };
+        let expected = field(&own, &Exposure { wavelength, share: Share::Whole(Channel::Luminance) });
+        let found = field(&cloud, &exposure);
         let off: f64 = found.samples.iter().zip(&expected.samples).map(|(a, b)| f64::from((a - b).norm_sqr())).sum();
         assert!(off < 1e-8 * expected.energy(), "{wavelength}: {off}");
     }
@@ -180,11 +177,11 @@ fn waves_reach_the_eye_in_step_in_each_laser() {
 fn a_budget_gives_as_many_points_and_keeps_the_edges() {
     let folder = tempfile::tempdir().expect("folder");
     let (scene, progress) = (lamps(folder.path()), Progress::new());
-    let grid = PanelProfile::generic().expect("profile").grid().expect("grid");
+    let setup = Setup::new(PanelProfile::generic().expect("profile"), None).expect("setup");
     let light = |points: Budget, size: (u32, u32)| {
         let mut settings = SceneSettings { points: Some(points), ..SceneSettings::default() };
         (settings.trace.width, settings.trace.height) = size;
-        pipeline::light(&scene, &settings, &grid, 632.8e-9, &progress).expect("light")
+        pipeline::points(&scene, &settings, &setup, &progress).expect("points")
     };
     // The lamps cover 0.64 of the picture.
     // On a coarse grid a column more or less of a lamp is several per cent.

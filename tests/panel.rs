@@ -5,11 +5,12 @@ use glam::{DVec2, DVec3};
 use holodrive::calibration::zernike;
 use holodrive::encode::{EncodeSettings, Encoding, encode};
 use holodrive::field::{Complex32, Complex64, Field, npy};
-use holodrive::hologram::HologramSettings;
 use holodrive::names::Named;
-use holodrive::panel::{Curve, Faults, Frame, PanelProfile, Response, Simulation, Wavefront, simulate, wavefront};
-use holodrive::pipeline;
-use holodrive::points::{Channel, Multiplexing, PointCloud, PointSource, SubFrames};
+use holodrive::panel::{
+    Curve, Faults, Frame, Origin, PanelProfile, Response, Setup, Simulation, Wavefront, simulate, wavefront,
+};
+use holodrive::pipeline::{self, Settings};
+use holodrive::points::{Exposure, Multiplexing, PointCloud, PointSource, SubFrames};
 use holodrive::progress::Progress;
 use holodrive::random::Random;
 use holodrive::reconstruction::metrics::speckle_contrast;
@@ -362,7 +363,6 @@ fn bad_calibrations_end_in_one_line() {
 fn speckle_of_sub_frames_falls_with_the_root_of_their_number() {
     let text = PROFILE.replace("width = 96", "width = 160").replace("64", "120").replace("0.93", "1.0");
     let profile = PanelProfile::parse(&text, Path::new("t.toml")).expect("profile");
-    let grid = profile.grid().expect("grid");
     let z = -0.03;
     // A square of points closer than the panel resolves at that depth (λz/D = 12 µm), all as bright.
     let points = (0..50 * 50)
@@ -373,23 +373,21 @@ fn speckle_of_sub_frames_falls_with_the_root_of_their_number() {
         .collect();
     let cloud = PointCloud { points, rgb: None };
     let progress = Progress::new();
+    let setup = Setup::new(profile, Some(WAVELENGTH)).expect("setup");
     let seen = |count: usize, multiplexing: Multiplexing| -> f64 {
-        let subframes = SubFrames { count, multiplexing, seed: 7 };
-        let pictures: Vec<Picture> = (0..count)
-            .map(|index| {
-                let share = subframes.points(&cloud, Channel::Luminance, index);
-                let settings = HologramSettings::default();
-                let field = pipeline::field_of(&share, &grid, WAVELENGTH, &settings, &progress).expect("field").field;
-                let settings = EncodeSettings::new(Encoding::named("double-phase").expect("name"));
-                let frame = encode(&field, &profile, &settings, &progress).expect("encode").frame;
-                let (light, view) =
-                    pipeline::simulated_light(&frame, &Simulation::default(), &progress).expect("light");
-                let (window, values) =
-                    reconstruction::intensity(&light, &View::Plane { z }, DVec2::splat(0.15e-3), &view, &progress)
-                        .expect("picture");
-                Picture { width: window.width, height: window.height, values }
-            })
-            .collect();
+        let sub_frames = Some(SubFrames { count, multiplexing, seed: 7 });
+        let settings = Settings { sub_frames, ..Settings::default() };
+        let look = |exposure: Exposure| {
+            let computed = pipeline::field(&cloud, &exposure, &setup, &settings.hologram, &progress).expect("field");
+            let field = computed.expect("light").field;
+            let encoded = pipeline::frame(&field, &setup, &settings.encode, Origin::default(), &progress);
+            let light = pipeline::light(&encoded.expect("frame").frame, &settings.bench, &progress).expect("light");
+            let (view, half) = (View::Plane { z }, DVec2::splat(0.15e-3));
+            let (window, values) =
+                reconstruction::intensity(&light.field, &view, half, &light.settings, &progress).expect("picture");
+            Picture { width: window.width, height: window.height, values }
+        };
+        let pictures: Vec<Picture> = pipeline::exposures(&setup, &settings, None).into_iter().map(look).collect();
         speckle_contrast(&Picture::mean(&pictures).expect("pictures").values)
     };
     let one = seen(1, Multiplexing::Phases);

@@ -2,15 +2,14 @@
 //! compared as complex numbers wherever one can be had.
 
 use glam::{DVec2, DVec3};
-use holodrive::encode::{EncodeSettings, Encoding, OffAxis, Reference};
+use holodrive::encode::{EncodeOptions, Encoded, Encoding, OffAxis, Reference};
 use holodrive::field::{Complex64, Fft2, Field, Grid, npy};
 use holodrive::hologram::{self, HologramSettings};
 use holodrive::names::Named;
-use holodrive::panel::simulated::Simulation;
-use holodrive::panel::{Frame, Illumination, PanelProfile};
-use holodrive::pipeline;
+use holodrive::panel::{Frame, Illumination, Origin, PanelProfile, Setup};
+use holodrive::pipeline::{self, Bench};
 use holodrive::points::trace::MirrorDepth;
-use holodrive::points::{Placement, PointSource, SceneView};
+use holodrive::points::{Placement, PointSource, SceneSettings, SceneView};
 use holodrive::progress::Progress;
 use holodrive::propagation;
 use holodrive::reconstruction::{self, Picture, View};
@@ -22,6 +21,12 @@ fn field_of(grid: &Grid, position: DVec3, phase: f64) -> Field {
     let points = [PointSource { position, amplitude: 0.5, phase }];
     let plan = hologram::plan(&points, grid, WAVELENGTH, &HologramSettings::default()).expect("plan");
     hologram::compute(&points, grid, WAVELENGTH, &plan, &Progress::new()).expect("field").field
+}
+
+fn frame(field: &Field, profile: &PanelProfile, encoding: Encoding) -> Encoded {
+    let setup = Setup::new(profile.clone(), Some(WAVELENGTH)).expect("setup");
+    let options = EncodeOptions { encoding: Some(encoding), ..EncodeOptions::default() };
+    pipeline::frame(field, &setup, &options, Origin::default(), &Progress::new()).expect("frame")
 }
 
 fn brightest(picture: &Picture) -> (usize, usize) {
@@ -97,16 +102,14 @@ fn up_is_up_and_left_is_left_from_point_to_picture_for_every_encoding_and_both_s
             let path = folder.path().join("field.npy");
             npy::write_field(&path, &field, &npy::Content::default(), "test").expect("write");
             let (field, _) = npy::read_field(&path, None, None).expect("read");
-            let settings = EncodeSettings::new(encoding.clone());
-            let encoded = pipeline::frame(&field, &profile, &settings, &Progress::new()).expect("frame");
+            let encoded = frame(&field, &profile, encoding.clone());
             let path = folder.path().join("frame.png");
             encoded.frame.write(&path).expect("write");
             let (frame, _) = Frame::read(&path, None, None).expect("read");
             assert_eq!(frame.levels, encoded.frame.levels);
-            let (behind, view) =
-                pipeline::simulated_light(&frame, &Simulation::default(), &Progress::new()).expect("light");
-            let half = DVec2::new(1.6e-3, 1.2e-3);
-            let seen = reconstruction::picture(&behind, &View::Plane { z }, half, (80, 60), &view, &Progress::new())
+            let light = pipeline::light(&frame, &Bench::default(), &Progress::new()).expect("light");
+            let (half, view) = (DVec2::new(1.6e-3, 1.2e-3), View::Plane { z });
+            let seen = reconstruction::picture(&light.field, &view, half, (80, 60), &light.settings, &Progress::new())
                 .expect("picture");
             // Cells of 40 µm: column (−0.6 + 1.6)/0.04 = 25, row (1.2 − 0.5)/0.04 = 17.5; the weaker one in column 45.
             let (column, row) = brightest(&seen);
@@ -143,15 +146,15 @@ fn each_letter_of_the_depth_chart_is_upright_and_sharp_at_its_own_depth_only() {
     // The whole way: glTF, points, hologram, an 8-bit double-phase frame, the simulated panel, reconstruction.
     let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/depth-chart.gltf");
     let profile = PanelProfile::generic().expect("profile");
-    let mut settings = pipeline::SceneSettings::default();
-    (settings.trace.width, settings.trace.height) = (300, 300);
-    let encode = EncodeSettings::new(Encoding::named("double-phase").expect("encoding"));
-    let all = (&settings, &HologramSettings::default(), &encode);
-    let out = pipeline::run(&scene, &profile, WAVELENGTH, all, &Progress::new()).expect("run");
-    let view = &out.lit.view;
+    let setup = Setup::new(profile, Some(WAVELENGTH)).expect("setup");
+    let bench = Bench { zero_order_stop: 0.05f64.to_radians(), ..Bench::default() };
+    let mut settings = pipeline::Settings { bench: bench.clone(), ..pipeline::Settings::default() };
+    (settings.scene.trace.width, settings.scene.trace.height) = (300, 300);
+    let out = pipeline::run(&scene, &setup, &settings, &Progress::new()).expect("run");
+    let view = &out.points.view;
+    let frame = &out.holograms[0].as_ref().expect("light").encoded.frame;
+    let light = pipeline::light(frame, &bench, &Progress::new()).expect("light");
     let target: Vec<f32> = view.picture.iter().map(|rgb| rgb[1]).collect();
-    let mut look = holodrive::reconstruction::ViewSettings { aperture: out.aperture, ..Default::default() };
-    look.block_zero_order(0.05f64.to_radians(), WAVELENGTH);
     let depths: Vec<f64> = (0..4)
         .map(|cell| {
             let lit = (0..target.len()).filter(|i| target[*i] > 0.5 && i % 300 / 150 + i / 300 / 150 * 2 == cell);
@@ -165,8 +168,15 @@ fn each_letter_of_the_depth_chart_is_upright_and_sharp_at_its_own_depth_only() {
         .iter()
         .map(|&z| {
             let half = view.placing.view_at(z);
-            reconstruction::picture(&out.behind, &View::Plane { z }, half, (300, 300), &look, &Progress::new())
-                .expect("picture")
+            reconstruction::picture(
+                &light.field,
+                &View::Plane { z },
+                half,
+                (300, 300),
+                &light.settings,
+                &Progress::new(),
+            )
+            .expect("picture")
         })
         .collect();
     for cell in 0..4 {
@@ -222,13 +232,14 @@ fn likeness(field: &Field, view: &SceneView, z: f64, corner: [usize; 2], size: u
 /// and at the depth of the path: both likenesses.
 fn sharp_and_blurred(scene: &std::path::Path, corner: [usize; 2], size: usize) -> (f64, f64) {
     let profile = PanelProfile::generic().expect("profile");
-    let grid = profile.grid().expect("grid");
+    let setup = Setup::new(profile, Some(WAVELENGTH)).expect("setup");
+    let grid = setup.grid;
     let lit = |mirror_depth| {
         let placement = Placement::Model { z: -0.15, eye: 0.6, scale: None };
-        let mut settings = pipeline::SceneSettings { placement, ..Default::default() };
+        let mut settings = SceneSettings { placement, ..Default::default() };
         (settings.trace.width, settings.trace.height) = (450, 450);
         settings.trace.mirror_depth = mirror_depth;
-        pipeline::light(scene, &settings, &grid, WAVELENGTH, &Progress::new()).expect("light")
+        pipeline::points(scene, &settings, &setup, &Progress::new()).expect("points")
     };
     let (focus, path) = (lit(MirrorDepth::Focus), lit(MirrorDepth::Path));
     let points = &focus.placed.cloud.points;
@@ -272,13 +283,11 @@ fn a_reference_at_a_positive_angle_runs_to_the_right_and_up() {
     for angles in [[0.02, 0.0], [0.0, 0.02], [-0.02, 0.0]] {
         let reference = Reference::Angle(angles);
         let encoding = Encoding::OffAxisBipolar(OffAxis { reference: Some(reference), ..OffAxis::default() });
-        let encoded =
-            pipeline::frame(&field, &profile, &EncodeSettings::new(encoding), &Progress::new()).expect("frame");
+        let encoded = frame(&field, &profile, encoding);
         let record = encoded.frame.metadata.encoding.clone().expect("record");
         let carrier = reference.frequency(WAVELENGTH);
         assert_eq!(record.illumination, Illumination::Plane { frequency: carrier });
-        let (behind, _) =
-            pipeline::simulated_light(&encoded.frame, &Simulation::default(), &Progress::new()).expect("light");
+        let behind = pipeline::light(&encoded.frame, &Bench::default(), &Progress::new()).expect("light").field;
         // The zero order, the brightest peak of the spectrum, stands at +carrier: f_x > 0 is light that runs to +x.
         let mut spectrum = behind.samples.clone();
         Fft2::new(grid.width, grid.height).forward(&mut spectrum, &Progress::new());

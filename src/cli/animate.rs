@@ -1,121 +1,79 @@
 //! `show` of an animated scene: each frame a hologram, computed ahead and played, or looked at on the simulated panel.
 
-use super::args::{ShowArgs, White};
+use super::args::ShowArgs;
 use super::bar::Bar;
-use super::encoding::encode_settings;
-use super::load::{self, Panel, hologram_settings, luminance_picture, scene_settings};
-use super::report::{Report, count, seconds};
-use super::sequence::{CELL, SHEET, frame_path};
-use super::show::finish;
+use super::report::{Report, count, seconds, step};
+use super::resolve;
+use super::sequence::{self, CELL, SHEET, frame_path};
 use glam::DVec2;
-use holodrive::encode::EncodeSettings;
 use holodrive::field::Grid;
-use holodrive::hologram::HologramSettings;
-use holodrive::panel::simulated::Simulation;
-use holodrive::pipeline;
+use holodrive::panel::Setup;
+use holodrive::pipeline::{self, Bench};
 use holodrive::points::{Placement, WhitePoint};
 use holodrive::progress::Progress;
-use holodrive::reconstruction::{self, Picture, View};
-use holodrive::sequence::{Animation, ContactSheet, Made};
+use holodrive::reconstruction::{self, ColorPicture, Picture, View};
+use holodrive::sequence::{Animation, AnimationFrame, AnimationFrameReport, ContactSheet};
 use holodrive::{Result, files};
-use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
 
 /// Frames per second where none are said and no monitor sets a rate [Hz].
 const USUAL_RATE: f64 = 12.0;
 
-/// What one frame took.
-#[derive(Clone, Debug, Serialize)]
-struct Took {
-    number: usize,
-    time: f64,
-    points: usize,
-    light_seconds: f64,
-    trace_seconds: f64,
-    field_seconds: f64,
-    seconds: f64,
-    still: bool,
-    light_kept: bool,
-    /// Light of the encoded field on the panel: what the brightness of frames is compared by.
-    scale: Option<f64>,
-}
-
-impl Took {
-    fn of(made: &Made) -> Self {
-        Self {
-            number: made.number,
-            time: made.time,
-            points: made.lit.placed.cloud.points.len(),
-            light_seconds: if made.light_kept { 0.0 } else { made.lit.illumination.seconds },
-            trace_seconds: if made.still { 0.0 } else { made.lit.trace.seconds },
-            field_seconds: if made.still { 0.0 } else { made.field.seconds },
-            seconds: made.seconds,
-            still: made.still,
-            light_kept: made.light_kept,
-            scale: made.encoded.frame.metadata.encoding.as_ref().map(|encoding| encoding.scale),
-        }
-    }
-}
-
-/// What the frames of an animation are made with.
+/// What frames are made with.
 struct Maker {
     animation: Animation,
-    panel: Panel,
-    hologram: HologramSettings,
-    encode: EncodeSettings,
+    setup: Setup,
 }
 
 impl Maker {
-    fn make(&self, args: &ShowArgs, progress: &Progress, take: &mut dyn FnMut(Made) -> Result<bool>) -> Result<()> {
-        let at = (&self.panel.profile, self.panel.wavelength, args.hologram.channel);
-        self.animation.make(at, &self.hologram, &self.encode, progress, take)
+    fn make(&self, progress: &Progress, take: &mut dyn FnMut(AnimationFrame) -> Result<bool>) -> Result<()> {
+        self.animation.make(&self.setup, progress, take)
     }
 }
 
 pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<Report> {
+    sequence::check(args)?;
     let begin = Instant::now();
-    let panel = load::panel(&args.panel, &mut report)?;
-    let settings = scene_settings(&args.light, &args.placement, White::Auto);
+    let setup = resolve::setup(&args.panel, &mut report)?;
+    let (setup, mut settings) = resolve::settings(args, setup)?;
+    // All frames look for the object at the same depths.
+    let content = match settings.scene.placement {
+        Placement::Window { near, far, .. } => [near, far],
+        Placement::Model { z, .. } => [z, z],
+    };
+    settings.encode.fix_depths(content);
+    // What cannot be is found out before the work.
+    report.warn(settings.encode.settings(&setup, setup.wavelength, Some(content))?.1);
     let rate = args.sequence.fps.unwrap_or(USUAL_RATE);
     let animation = Animation::new(path, &settings, rate, args.sequence.from, args.sequence.to)?;
     #[cfg(feature = "display")]
     let screen = super::screen::Screen::asked(args)?;
-    let content = match settings.placement {
-        Placement::Window { near, far, .. } => Some([near, far]),
-        Placement::Model { z, .. } => Some([z, z]),
-    };
-    let encode = encode_settings(&args.encoding, &panel, content, &mut report)?;
-    let hologram = hologram_settings(&args.hologram);
     files::output_folder(&args.output.join("frames"))?;
     let bar = Bar::new();
-    let mut maker = Maker { animation, panel, hologram, encode };
+    let mut maker = Maker { animation, setup };
     let frames = maker.animation.times.len();
-    report.add("animation_frames", frames, "");
-    maker.animation.first_look(&maker.panel.grid, &bar.progress)?;
-    let held = &maker.animation.scene;
-    report.add_serialised("held_depths", &held.anchors.depths, "");
-    report.add("held_white", if let WhitePoint::At(white) = held.white { white } else { 0.0 }, "");
+    report.value("animation_frames", frames);
+    maker.animation.first_look(&maker.setup.grid, &bar.progress)?;
+    let scene = &maker.animation.settings.scene;
+    report.value("held_depths", scene.anchors.depths);
+    report.value("held_white", if let WhitePoint::At(white) = scene.white { white } else { 0.0 });
     let look = begin.elapsed().as_secs_f64();
-    let line = format!(
-        "first look   {:>8}  {} frames, one camera, depth range and white for all",
-        seconds(look),
-        count(frames)
-    );
-    report.add("first_look_seconds", look, line);
+    let what = format!("{} frames, one camera, depth range and white for all", count(frames));
+    report.add("first_look_seconds", look, step("first look", look, what));
     #[cfg(feature = "display")]
     if let Some(screen) = screen {
         play(args, &maker, screen, &bar.progress, &mut report)?;
         drop(bar);
-        return finish(report, &args.output);
+        return report.written_to(&args.output);
     }
     let (mut took, mut sheet) = (Vec::new(), ContactSheet::new(SHEET));
-    maker.make(args, &bar.progress, &mut |made| {
+    maker.make(&bar.progress, &mut |made| {
         made.encoded.frame.write(&frame_path(&args.output, made.number))?;
         if made.number == 0 {
-            report.warn(made.lit.warnings.iter());
+            report.warn(made.points.warnings.iter());
         }
-        took.push(Took::of(&made));
+        took.push(made.report());
         if sheet.wants(made.number) {
             let label = format!("#{} {:.3} s", made.number, made.time);
             sheet.add(made.number, label, pictures(args, &made, &bar.progress.part())?)?;
@@ -132,26 +90,26 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
         total,
         format!("in all       {:>8}  contact.png: traced above, simulated reconstruction below", seconds(total)),
     );
-    finish(report, &args.output)
+    report.written_to(&args.output)
 }
 
 /// The traced picture, and the reconstruction focused on the nearest object.
-fn pictures(args: &ShowArgs, made: &Made, progress: &Progress) -> Result<Vec<Picture>> {
-    let view = &made.lit.view;
-    let (field, mut settings) = pipeline::simulated_light(&made.encoded.frame, &Simulation::default(), progress)?;
-    settings.block_zero_order(args.zero_order_stop, field.wavelength);
+fn pictures(args: &ShowArgs, made: &AnimationFrame, progress: &Progress) -> Result<Vec<Picture>> {
+    let view = &made.points.view;
+    let bench = Bench { zero_order_stop: args.zero_order_stop, ..Bench::default() };
+    let light = pipeline::light(&made.encoded.frame, &bench, progress)?;
     let z = args.sequence.focus.unwrap_or_else(|| view.focus.first().map_or(0.0, |(_, z)| *z));
     let size = (CELL, ((CELL * view.height) as f64 / view.width as f64).round().clamp(1.0, 4.0 * CELL as f64) as usize);
-    let traced = luminance_picture(&made.lit);
+    let traced = ColorPicture { width: view.width, height: view.height, rgb: view.picture.clone() }.luminance();
     let cells = Grid::new(traced.width, traced.height, 1.0, 1.0)?;
     let half = 0.5 * DVec2::new(traced.width as f64, traced.height as f64);
     let traced = Picture::from_samples(&cells, &traced.values, half, size.0, size.1);
     let at = View::Plane { z };
-    let seen = reconstruction::picture(&field, &at, view.placing.view_at(z), size, &settings, progress)?;
+    let seen = reconstruction::picture(&light.field, &at, view.placing.view_at(z), size, &light.settings, progress)?;
     Ok(vec![traced, seen])
 }
 
-fn report_frames(took: &[Took], rate: f64, report: &mut Report) {
+fn report_frames(took: &[AnimationFrameReport], rate: f64, report: &mut Report) {
     report.add_serialised("frames_made", &took, "");
     let mut each: Vec<f64> = took.iter().map(|frame| frame.seconds).collect();
     each.sort_by(f64::total_cmp);
@@ -198,7 +156,7 @@ fn play(
     use std::sync::mpsc::sync_channel;
     use std::sync::{Arc, Mutex};
 
-    let signal = &maker.panel.profile.signal;
+    let signal = &maker.setup.profile.signal;
     let frames = maker.animation.times.len();
     let all = args.sequence.ahead == Ahead::All;
     // A loop keeps them, too.
@@ -208,23 +166,23 @@ fn play(
     let mut playing = PlaySettings {
         // The clip runs at its own speed, whatever the monitor's rate is.
         rate: Some(args.sequence.fps.unwrap_or(USUAL_RATE)),
-        settle: maker.panel.profile.settle_time.unwrap_or(0.0),
+        settle: maker.setup.profile.settle_time.unwrap_or(0.0),
         ..screen.play_settings()
     };
     let (took, warnings) = (Mutex::new(Vec::new()), Mutex::new(Vec::new()));
-    let ready = |made: &Made| -> Result<Arc<DisplayFrame>> {
+    let ready = |made: &AnimationFrame| -> Result<Arc<DisplayFrame>> {
         made.encoded.frame.write(&frame_path(&args.output, made.number))?;
         if let Ok(mut took) = took.lock() {
-            took.push(Took::of(made));
+            took.push(made.report());
         }
         if let (0, Ok(mut warnings)) = (made.number, warnings.lock()) {
-            warnings.clone_from(&made.lit.warnings);
+            warnings.clone_from(&made.points.warnings);
         }
         Ok(Arc::new(DisplayFrame::packed(&[&made.encoded.frame])?))
     };
     let outcome = if all {
         let mut kept: Vec<Arc<DisplayFrame>> = Vec::new();
-        maker.make(args, progress, &mut |made| {
+        maker.make(progress, &mut |made| {
             kept.push(ready(&made)?);
             Ok(true)
         })?;
@@ -237,7 +195,7 @@ fn play(
         std::thread::scope(|scope| {
             scope.spawn(|| {
                 let sender = sender;
-                let made = maker.make(args, &making, &mut |made| Ok(sender.send(ready(&made)).is_ok()));
+                let made = maker.make(&making, &mut |made| Ok(sender.send(ready(&made)).is_ok()));
                 match made {
                     // The play has ended, and nobody listens.
                     Ok(()) | Err(Error::Interrupted) => {}

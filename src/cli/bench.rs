@@ -3,7 +3,9 @@
 use super::args::{BenchCommand, EncodingsArgs, IterationsArgs};
 use super::bar::Bar;
 use super::report::{Report, seconds};
-use holodrive::comparison::{Effort, compare, encodings, flat_picture, markdown, panels, scene_picture};
+use holodrive::comparison::{
+    ComparedPicture, Effort, compare, encodings, flat_picture, markdown, panels, scene_picture,
+};
 use holodrive::encode::iterative::{GradientDescent, Start, Target, TargetPlane, gradient_descent};
 use holodrive::field::{Complex32, Fft2};
 use holodrive::names::Named;
@@ -30,15 +32,16 @@ fn table(args: &EncodingsArgs) -> Result<Report> {
     }
     let bar = Bar::new();
     let panels = panels(width, height)?;
-    let mut pictures = vec![("flat".to_owned(), flat_picture(&panels[0].profile))];
+    let mut pictures = vec![ComparedPicture { name: "flat".into(), picture: flat_picture(&panels[0].setup.profile) }];
     for scene in &args.scene {
         let name = scene.file_stem().map_or_else(|| scene.display().to_string(), |s| s.to_string_lossy().into_owned());
         // As many planes as the depth chart has letters; three show that depth is there.
         let planes = if name.contains("chart") { 4 } else { 3 };
-        pictures.push((name, scene_picture(scene, &panels[0].profile, planes, &bar.progress)?));
+        let picture = scene_picture(scene, &panels[0].setup, planes, &bar.progress)?;
+        pictures.push(ComparedPicture { name, picture });
     }
     let mut rows = Vec::new();
-    for (name, picture) in &pictures {
+    for picture in &pictures {
         for panel in &panels {
             for encoding in encodings() {
                 if !args.only.is_empty() && !args.only.iter().any(|only| only.name() == encoding) {
@@ -46,7 +49,7 @@ fn table(args: &EncodingsArgs) -> Result<Report> {
                 }
                 bar.progress.check()?;
                 let effort = Effort { iterations: args.iterations, start: args.start };
-                rows.push(compare((name, picture), panel, encoding, effort, &bar.progress)?);
+                rows.push(compare(picture, panel, encoding, effort, &bar.progress)?);
             }
         }
     }

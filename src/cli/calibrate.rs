@@ -2,13 +2,13 @@
 
 use super::args::{CalibrateCommand, CheckArgs, CurveArgs, FlatnessArgs, PanelArgs, ShownArgs};
 use super::bar::Bar;
-use super::load::{Panel, panel, panel_correction};
 use super::report::{Report, seconds};
+use super::resolve::{self, told_correction};
 use holodrive::calibration::{
     Flatness, FrameSeries, Sweep, card_frames, cards, measure_curve, step_frames, wavefront_from_files,
     write_correction, zernike,
 };
-use holodrive::panel::{Modulation, PanelProfile};
+use holodrive::panel::{Modulation, PanelProfile, Setup};
 use holodrive::progress::Progress;
 use holodrive::units::show_length;
 use holodrive::{Error, Result};
@@ -71,8 +71,8 @@ fn duration(shown: &ShownArgs, profile: &PanelProfile) -> Result<Duration> {
     }
 }
 
-fn phase_panel(args: &PanelArgs, report: &mut Report) -> Result<Panel> {
-    let found = panel(args, report)?;
+fn phase_panel(args: &PanelArgs, report: &mut Report) -> Result<Setup> {
+    let found = resolve::setup(args, report)?;
     if found.profile.modulation() != Modulation::Phase {
         let what = format!("{} modulates amplitude; curve and flatness are of phase panels", found.profile.name);
         return Err(Error::parameter("panel", what));
@@ -82,7 +82,7 @@ fn phase_panel(args: &PanelArgs, report: &mut Report) -> Result<Panel> {
 
 fn sweep(args: &CurveArgs) -> Result<Report> {
     let mut report = Report::new("calibrate curve");
-    let Panel { profile, wavelength, .. } = phase_panel(&args.panel, &mut report)?;
+    let Setup { profile, wavelength, .. } = phase_panel(&args.panel, &mut report)?;
     let settings = Sweep { levels: args.levels, stripe: args.stripe, regions: args.regions, order: args.order };
     let series = settings.frames(&profile, wavelength)?;
     let folder = args.output.as_deref().unwrap_or(Path::new("sweep"));
@@ -139,7 +139,7 @@ fn curve(args: &CurveArgs, powers: &Path) -> Result<Report> {
 
 fn steps(args: &FlatnessArgs) -> Result<Report> {
     let mut report = Report::new("calibrate flatness");
-    let Panel { profile, wavelength, .. } = phase_panel(&args.panel, &mut report)?;
+    let Setup { profile, wavelength, .. } = phase_panel(&args.panel, &mut report)?;
     if args.into.is_some() {
         return Err(Error::parameter("into", "the correction is not known before --interferograms or --zernike"));
     }
@@ -155,7 +155,7 @@ fn steps(args: &FlatnessArgs) -> Result<Report> {
 
 fn flatness(args: &FlatnessArgs) -> Result<Report> {
     let mut report = Report::new("calibrate flatness");
-    let Panel { profile, wavelength, grid, .. } = phase_panel(&args.panel, &mut report)?;
+    let Setup { profile, wavelength, grid, .. } = phase_panel(&args.panel, &mut report)?;
     let output = args.output.as_deref().unwrap_or(Path::new("flatness.npy"));
     let error = if args.zernike.is_empty() {
         wavefront_from_files(&profile, wavelength, &args.interferograms)?
@@ -183,7 +183,7 @@ fn flatness(args: &FlatnessArgs) -> Result<Report> {
 fn check(args: &CheckArgs) -> Result<Report> {
     let mut report = Report::new("calibrate check");
     let panel = phase_panel(&args.panel, &mut report)?;
-    let correction = panel_correction(&panel, None, &mut report)?;
+    let correction = told_correction(&panel, &mut report)?;
     let made = cards(&panel.profile, panel.wavelength, correction.as_ref(), args.distance, &Progress::new())?;
     give_out(&card_frames(&made), &args.output, &args.shown, &panel.profile, &mut report)?;
     for card in &made {

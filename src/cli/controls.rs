@@ -1,13 +1,12 @@
 //! What keys set in a live show: how the scene stands, in which light and encoding, and how the operator looks at it.
 
 use super::args::ShowArgs;
-use super::load::Panel;
 use glam::DVec3;
 use holodrive::display::{Key, KeyPress};
 use holodrive::encode::Encoding;
 use holodrive::live::Look;
 use holodrive::names::Named;
-use holodrive::panel::Modulation;
+use holodrive::panel::{Modulation, Setup};
 
 /// Lasers that are offered beside the profile's own, where the panel has a curve for them [m].
 const LASERS: [f64; 4] = [638e-9, 532e-9, 520e-9, 450e-9];
@@ -111,12 +110,11 @@ impl Controls {
         DVec3::new(x * SHIFT_STEP, y * SHIFT_STEP, z * DEPTH_STEP)
     }
 
-    pub(super) fn look_at(&self, near: f64, zero_order_stop: f64) -> Look {
+    pub(super) fn look_at(&self, near: f64) -> Look {
         Look {
             focus: self.focus.unwrap_or(near),
             eye: self.eye.map(|eye| eye.map(|steps| f64::from(steps) * EYE_STEP)),
             pupil: 4e-3,
-            zero_order_stop,
         }
     }
 }
@@ -128,9 +126,9 @@ pub(super) struct Choices {
 }
 
 impl Choices {
-    pub(super) fn new(args: &ShowArgs, panel: &Panel) -> Self {
-        let profile = &panel.profile;
-        let mut wavelengths = vec![panel.wavelength];
+    pub(super) fn new(args: &ShowArgs, setup: &Setup) -> Self {
+        let profile = &setup.profile;
+        let mut wavelengths = vec![setup.wavelength];
         for other in profile.wavelengths.iter().chain(&LASERS) {
             let new = wavelengths.iter().all(|known| (known - other).abs() > 1e-9);
             if new && profile.drive_curve(*other).is_ok() {
@@ -176,12 +174,12 @@ mod tests {
         // The look does not change the hologram: focus from the nearest object on, the eye in steps.
         assert_eq!(press(&mut controls, Key::Letter('.'), false), Changed::Look);
         press(&mut controls, Key::Letter('i'), false);
-        let look = controls.look_at(-0.3, 0.0);
+        let look = controls.look_at(-0.3);
         assert!((look.focus - (-0.1 - FOCUS_STEP)).abs() < 1e-15 && look.eye == Some([0.0, EYE_STEP]));
         press(&mut controls, Key::Letter('p'), false);
-        assert_eq!(controls.look_at(-0.3, 0.0).eye, None);
+        assert_eq!(controls.look_at(-0.3).eye, None);
         press(&mut controls, Key::Letter('r'), false);
         assert_eq!((controls.turn, controls.shift, controls.focus), ([0; 2], [0; 3], None));
-        assert_eq!(controls.look_at(-0.3, 0.0).focus, -0.3);
+        assert_eq!(controls.look_at(-0.3).focus, -0.3);
     }
 }

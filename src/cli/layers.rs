@@ -1,11 +1,13 @@
 //! `compute` of pictures that stay pictures: planes by fast transforms, in one colour or three.
 
 use super::args::ComputeArgs;
-use super::colour::named;
-use super::load::{Input, Panel, placed_by};
+use super::holograms::named;
+use super::load::Input;
 use super::report::{Report, step};
+use super::resolve;
 use holodrive::field::npy::{self, Content};
 use holodrive::hologram::layers::{self, SliceSettings};
+use holodrive::panel::Setup;
 use holodrive::points::colour::NAMES;
 use holodrive::points::images::{RgbDepth, Window};
 use holodrive::points::placement::Phase;
@@ -20,21 +22,21 @@ use std::time::Instant;
 pub(super) fn compute(
     args: &ComputeArgs,
     input: &Input,
-    panel: &Panel,
+    setup: &Setup,
     progress: &Progress,
     report: &mut Report,
 ) -> Result<()> {
-    let placement = placed_by(&args.placement);
+    let placement = resolve::placement(&args.placement);
     let slices = match (input, args.layers) {
         (Input::Images(rgb, depth), Some(count)) => {
             let picture = RgbDepth::read(rgb, depth, args.placement.depth_scale, &placement)?;
-            let window = Window::new(&placement, picture.size(), &panel.grid)?;
-            Slices::of_depth(picture, window, &panel.grid, count)?
+            let window = Window::new(&placement, picture.size(), &setup.grid)?;
+            Slices::of_depth(picture, window, &setup.grid, count)?
         }
         (Input::Stack(_), Some(_)) => {
             return Err(Error::parameter("layers", "a focal stack has the planes that it has; leave --layers out"));
         }
-        (Input::Stack(files), None) => Slices::of_stack(files, &placement, &panel.grid)?,
+        (Input::Stack(files), None) => Slices::of_stack(files, &placement, &setup.grid)?,
         _ => return Err(Error::parameter("layers", "layers are for a picture with depth (rgb.png+depth.png)")),
     };
     let seed = match args.placement.phase {
@@ -45,14 +47,14 @@ pub(super) fn compute(
         }
     };
     let settings = SliceSettings { occlude: !args.see_through, random_phase: seed, memory: args.hologram.memory };
-    let lights: Vec<(f64, Light)> = match &panel.lasers {
-        None => vec![(panel.wavelength, Light::Channel(args.hologram.channel))],
+    let lights: Vec<(f64, Light)> = match &setup.lasers {
+        None => vec![(setup.wavelength, Light::Channel(args.hologram.channel))],
         Some(lasers) => (0..3).map(|i| (lasers.wavelengths()[i], Light::Laser(lasers, i))).collect(),
     };
     let colored = lights.len() > 1;
     for (i, (wavelength, light)) in lights.into_iter().enumerate() {
         let begin = Instant::now();
-        let (field, lit) = layers::of_slices(&slices, light, &panel.grid, wavelength, &settings, progress)?;
+        let (field, lit) = layers::of_slices(&slices, light, &setup.grid, wavelength, &settings, progress)?;
         let mut own = Report::new("compute");
         let part = if colored { &mut own } else { &mut *report };
         let depths = slices.depths();
@@ -66,7 +68,7 @@ pub(super) fn compute(
         let grid = (slices.lattice.width, slices.lattice.height);
         let what = format!("layers: {planes}, z {near} … {far}, {lit} lit samples of {}×{}", grid.0, grid.1);
         part.line(step("field", spent, what));
-        let path = if colored { named(&args.output, NAMES[i]) } else { args.output.clone() };
+        let path = if colored { named(&args.output, &format!("-{}", NAMES[i])) } else { args.output.clone() };
         let content = Content { z: 0.0, depth: Some([first, last]), eye: None, window: None };
         let origin = format!("{} layers of {}", depths.len(), args.input.display());
         npy::write_field(&path, &field, &content, &origin)?;

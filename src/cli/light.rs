@@ -1,11 +1,10 @@
 //! What was done with a scene's light, in lines for people and values for machines.
 
 use super::report::{Report, count, seconds};
-use holodrive::pipeline::Lit;
 use holodrive::points::PointCloud;
-use holodrive::points::WhiteLevel;
 use holodrive::points::budget::{Limit, Rays};
 use holodrive::points::colour::{Gamut, Lasers};
+use holodrive::points::{ScenePoints, WhiteLevel};
 use holodrive::units::show_length;
 use serde_json::Value;
 
@@ -22,9 +21,9 @@ pub(super) fn report_cloud(cloud: &PointCloud, elapsed: f64, report: &mut Report
     );
 }
 
-pub(super) fn report_light(lit: &Lit, elapsed: f64, report: &mut Report) {
-    report.warn(lit.warnings.iter());
-    let (light, trace) = (&lit.illumination, &lit.trace);
+pub(super) fn report_light(scene: &ScenePoints, elapsed: f64, report: &mut Report) {
+    report.warn(scene.warnings.iter());
+    let (light, trace) = (&scene.illumination, &scene.trace);
     let load = (elapsed - light.seconds - trace.seconds).max(0.0);
     report.add("scene_seconds", load, format!("scene        {:>8}", seconds(load)));
     let energy = &light.energy;
@@ -62,25 +61,25 @@ pub(super) fn report_light(lit: &Lit, elapsed: f64, report: &mut Report) {
         trace.seconds,
         format!("rays         {:>8}  {} rays", seconds(trace.seconds), count(trace.rays as usize)),
     );
-    if let Some(rays) = &lit.rays {
-        report_budget(rays, lit, report);
+    if let Some(rays) = &scene.rays {
+        report_budget(rays, scene, report);
     }
-    report_cloud(&lit.placed.cloud, 0.0, report);
-    report_exposure(&lit.white, report);
+    report_cloud(&scene.placed.cloud, 0.0, report);
+    report_exposure(&scene.white, report);
     report.add("mirrored_points", trace.by_mirror, "");
-    report.add("beyond_cone", lit.placed.beyond_cone, "");
-    report.add("beyond_cone_light", lit.placed.beyond_cone_light, "");
-    if lit.placed.beyond_cone > 0 {
+    report.add("beyond_cone", scene.placed.beyond_cone, "");
+    report.add("beyond_cone_light", scene.placed.beyond_cone_light, "");
+    if scene.placed.beyond_cone > 0 {
         report.warn([format!(
             "{} points ({:.1} % of the light) stand where the panel cannot send light to the eye; move the viewer back or use a finer pitch",
-            count(lit.placed.beyond_cone),
-            100.0 * lit.placed.beyond_cone_light
+            count(scene.placed.beyond_cone),
+            100.0 * scene.placed.beyond_cone_light
         )]);
     }
 }
 
 /// What a budget chose, and why.
-fn report_budget(rays: &Rays, lit: &Lit, report: &mut Report) {
+fn report_budget(rays: &Rays, scene: &ScenePoints, report: &mut Report) {
     let [eye, panel] =
         [rays.resolution.eye, rays.resolution.panel].map(|[x, y]| format!("{:.0} × {:.0}", x.floor(), y.floor()));
     let why = match rays.limit {
@@ -88,7 +87,7 @@ fn report_budget(rays: &Rays, lit: &Lit, report: &mut Report) {
         Limit::Eye => "all that the eye resolves",
         Limit::Panel => "all that the panel resolves",
     };
-    let viewer = show_length(lit.view.placing.eye.z);
+    let viewer = show_length(scene.view.placing.eye.z);
     let [across, down] = rays.size;
     report.add_serialised("budget", rays, "");
     report.add("", Value::Null, format!("budget                 {across} × {down} rays, {why}; an eye at {viewer} resolves {eye} (1/60°), the panel {panel} (pitch, or λz/D)"));

@@ -1,23 +1,23 @@
 //! `show --live`: a hologram that follows its scene's file and the operator's keys, and the operator's view of it.
 
-use super::args::{ShowArgs, White};
+use super::args::ShowArgs;
 use super::bar::Bar;
 use super::controls::{Changed, Choices, Controls, KEYS, TURN_STEP};
-use super::encoding::encode_settings;
-use super::load::{self, Panel, hologram_settings, scene_settings};
+use super::load::{self, Input};
 use super::report::{Report, count, seconds};
+use super::resolve;
 use super::screen::show_settings;
-use super::show::finish;
 use holodrive::display::{Display, DisplayFrame, Key, KeyPress, OperatorChoice, PanelLoop, ShowEnd, Turn};
-use holodrive::live::{Board, Detail, Happened, PICTURE, Refined, Seen, Viewer, Watch, Wish, Worker, draw};
+use holodrive::live::{
+    Board, Detail, LiveHologram, OperatorPicture, PICTURE, Request, Viewer, Watch, Worker, WorkerEvent, draw,
+};
 use holodrive::names::Named;
-use holodrive::panel::Frame;
+use holodrive::panel::{Frame, Setup};
 use holodrive::points::Placement;
 use holodrive::units::show_length;
 use holodrive::{Error, Result, files};
 use serde_json::{Value, json};
 use std::io::Write;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -28,16 +28,16 @@ const WATCH: Duration = Duration::from_millis(200);
 /// A show that follows its scene.
 struct Live<'a> {
     args: &'a ShowArgs,
-    panel: Panel,
+    setup: Setup,
     choices: Choices,
     controls: Controls,
     worker: Worker,
     viewer: Viewer,
     watch: Watch,
     shown: PanelLoop<'a>,
-    newest: Option<Arc<Refined>>,
-    seen: Option<Seen>,
-    /// From the wish until the panel had it: of the newest hologram.
+    newest: Option<Arc<LiveHologram>>,
+    seen: Option<OperatorPicture>,
+    /// From the request until the panel had it: of the newest hologram.
     presented: f64,
     warning: Option<String>,
     events: Option<std::fs::File>,
@@ -54,12 +54,24 @@ struct Counts {
     failed: usize,
 }
 
-pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<Report> {
+pub(super) fn show(args: &ShowArgs, mut report: Report) -> Result<Report> {
+    let in_time = &args.sequence;
+    let played = in_time.fps.is_some() || in_time.repeat || in_time.from.is_some() || in_time.to.is_some();
+    if played || !args.more.is_empty() {
+        return Err(Error::parameter("live", "shows a scene at one --time; leave --fps, --loop, --from and --to out"));
+    }
+    if args.color.wavelengths.is_some() || args.subframes != 1 {
+        return Err(Error::parameter("live", "shows one frame of one laser; leave --wavelengths and --subframes out"));
+    }
+    let Input::Scene(path) = load::input(&args.input)? else {
+        return Err(Error::input(&args.input, "is no scene (.gltf, .glb); --live follows a scene"));
+    };
     let Some(mut settings) = show_settings(args)? else {
         return Err(Error::parameter("live", "needs the panel's monitor: --monitor (see `holodrive monitors`)"));
     };
     let place: OperatorChoice = args.operator.parse()?;
-    let panel = load::panel(&args.panel, &mut report)?;
+    let setup = resolve::setup(&args.panel, &mut report)?;
+    let (setup, steps) = resolve::settings(args, setup)?;
     let mut display = Display::connect()?;
     let monitors = display.monitors()?;
     let monitor = settings.monitor.find(&monitors)?;
@@ -68,8 +80,7 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
         report.warn(["there is no monitor beside the panel's: no operator's view"]);
     }
     // The panel is taken with all levels at zero, before anything is computed.
-    let levels = vec![0; panel.profile.width * panel.profile.height];
-    let idle = Frame::new(&panel.profile, panel.wavelength, levels)?;
+    let idle = Frame::new(&setup.profile, setup.wavelength, vec![0; setup.grid.len()])?;
     settings.window.take_keyboard = home.is_none();
     let idle = Arc::new(DisplayFrame::packed(&[&idle])?);
     let bar = Bar::new();
@@ -78,11 +89,10 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
     if let Some(home) = home {
         shown.open_operator(&home, &Arc::new(picture(&Board { keys: &KEYS, ..Board::default() })?))?;
     }
-    let (choices, controls) = (Choices::new(args, &panel), Controls::new());
-    let wish = wish(args, &panel, &choices, &controls)?;
-    let scene = scene_settings(&args.light, &args.placement, White::Auto);
-    let at = (panel.profile.clone(), args.hologram.channel);
-    let (worker, files) = Worker::start(path, scene, at, hologram_settings(&args.hologram), wish)?;
+    let (choices, controls) = (Choices::new(args, &setup), Controls::new());
+    let first = request(args, &setup, &choices, &controls)?;
+    let viewer_bench = steps.bench.clone();
+    let (worker, files) = Worker::start(&path, setup.clone(), steps, first)?;
     files::output_folder(&args.output)?;
     let events = args.sequence.events.as_ref();
     let events = events.map(|path| std::fs::File::create(path).map_err(Error::io(path))).transpose()?;
@@ -95,11 +105,11 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
     };
     let mut live = Live {
         args,
-        panel,
+        setup,
         choices,
         controls,
         worker,
-        viewer: Viewer::start(size),
+        viewer: Viewer::start(size, viewer_bench),
         watch: Watch::new(files),
         shown,
         newest: None,
@@ -116,7 +126,7 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
     let Live { shown, worker, viewer, .. } = live;
     drop((worker, viewer));
     shown.close(end)?.end.as_asked()?;
-    finish(report, &args.output)
+    report.written_to(&args.output)
 }
 
 fn picture(board: &Board) -> Result<DisplayFrame> {
@@ -125,19 +135,20 @@ fn picture(board: &Board) -> Result<DisplayFrame> {
 }
 
 /// What the flags and keys ask for.
-fn wish(args: &ShowArgs, panel: &Panel, choices: &Choices, controls: &Controls) -> Result<Wish> {
-    let wavelength = choices.wavelengths.get(controls.wavelength).copied().unwrap_or(panel.wavelength);
-    let mut encoding = args.encoding.clone();
-    encoding.encoding = choices.encodings.get(controls.encoding).cloned();
-    let content = match scene_settings(&args.light, &args.placement, White::Auto).placement {
-        Placement::Window { near, far, .. } => Some([near, far]),
-        Placement::Model { z, .. } => Some([z, z]),
+fn request(args: &ShowArgs, setup: &Setup, choices: &Choices, controls: &Controls) -> Result<Request> {
+    let wavelength = choices.wavelengths.get(controls.wavelength).copied().unwrap_or(setup.wavelength);
+    let mut flags = args.encoding.clone();
+    flags.encoding = choices.encodings.get(controls.encoding).cloned();
+    let content = match resolve::placement(&args.placement) {
+        Placement::Window { near, far, .. } => [near, far],
+        Placement::Model { z, .. } => [z, z],
     };
-    let at = Panel { profile: panel.profile.clone(), grid: panel.grid, wavelength, lasers: None };
-    // Warnings of a profile were told at the beginning.
-    let encode = encode_settings(&encoding, &at, content, &mut Report::default())?;
+    let mut encode = resolve::encode(&flags, setup)?;
+    encode.fix_depths(content);
+    // What cannot be is not asked for; warnings of a profile were told at the beginning.
+    encode.settings(setup, wavelength, Some(content))?;
     let turn = controls.turn.map(|steps| f64::from(steps) * TURN_STEP);
-    Ok(Wish { turn, shift: controls.shifted(), wavelength, encode })
+    Ok(Request { turn, shift: controls.shifted(), wavelength, encode })
 }
 
 impl Live<'_> {
@@ -156,11 +167,11 @@ impl Live<'_> {
             if looked.elapsed() >= WATCH {
                 looked = Instant::now();
                 if self.watch.changed() {
-                    self.wish(true)?;
+                    self.request(true)?;
                 }
             }
-            while let Some(happened) = self.worker.poll()? {
-                self.happened(happened)?;
+            while let Some(event) = self.worker.poll()? {
+                self.heard(event)?;
             }
             self.look()?;
         }
@@ -168,7 +179,7 @@ impl Live<'_> {
 
     /// Depth of the nearest object of the newest hologram.
     fn near(&self) -> f64 {
-        let focus = self.newest.as_ref().and_then(|newest| newest.lit.view.focus.first());
+        let focus = self.newest.as_ref().and_then(|newest| newest.points.view.focus.first());
         focus.map_or(self.args.placement.near, |(_, z)| *z)
     }
 
@@ -182,7 +193,7 @@ impl Live<'_> {
                 Changed::Look => look = true,
             }
         }
-        if hologram && self.wish(false)?.is_none() {
+        if hologram && self.request(false)?.is_none() {
             // What cannot be is not set.
             self.controls = before;
         }
@@ -193,11 +204,11 @@ impl Live<'_> {
         Ok(())
     }
 
-    /// Wishes for what the keys have set; none where that cannot be.
-    fn wish(&mut self, reload: bool) -> Result<Option<u64>> {
-        match wish(self.args, &self.panel, &self.choices, &self.controls) {
-            Ok(wish) => {
-                let version = self.worker.wish(wish, reload);
+    /// Requests what the keys have set; none where that cannot be.
+    fn request(&mut self, reload: bool) -> Result<Option<u64>> {
+        match request(self.args, &self.setup, &self.choices, &self.controls) {
+            Ok(request) => {
+                let version = self.worker.request(request, reload);
                 self.event(&json!({ "event": "wish", "version": version, "reload": reload }));
                 Ok(Some(version))
             }
@@ -211,25 +222,25 @@ impl Live<'_> {
 
     fn ask(&mut self) {
         if let Some(newest) = &self.newest {
-            self.viewer.ask(newest, self.controls.look_at(self.near(), self.args.zero_order_stop));
+            self.viewer.ask(newest, self.controls.look_at(self.near()));
         }
     }
 
-    fn happened(&mut self, happened: Happened) -> Result<()> {
-        match happened {
-            Happened::Refined(refined) => self.present(Arc::new(*refined))?,
-            Happened::Loaded(files) => {
+    fn heard(&mut self, event: WorkerEvent) -> Result<()> {
+        match event {
+            WorkerEvent::Ready(hologram) => self.present(Arc::new(*hologram))?,
+            WorkerEvent::Loaded(files) => {
                 self.watch = Watch::new(files);
                 self.warning = None;
                 self.event(&json!({ "event": "loaded" }));
             }
-            Happened::Failed(why) => {
+            WorkerEvent::Failed(why) => {
                 self.counts.failed += 1;
                 self.event(&json!({ "event": "failed", "what": why }));
                 self.warn(&why);
                 self.redraw()?;
             }
-            Happened::Cancelled(after) => {
+            WorkerEvent::Cancelled(after) => {
                 self.counts.cancelled.push(after);
                 self.event(&json!({ "event": "cancelled", "after": after }));
             }
@@ -237,35 +248,35 @@ impl Live<'_> {
         Ok(())
     }
 
-    fn present(&mut self, refined: Arc<Refined>) -> Result<()> {
+    fn present(&mut self, hologram: Arc<LiveHologram>) -> Result<()> {
         let ready = Instant::now();
-        self.shown.panel_mut().present(&Arc::new(DisplayFrame::packed(&[&refined.frame])?))?;
-        self.presented = refined.seconds + ready.elapsed().as_secs_f64();
-        self.counts.shown[refined.detail as usize] += 1;
-        match refined.detail {
+        self.shown.panel_mut().present(&Arc::new(DisplayFrame::packed(&[&hologram.frame])?))?;
+        self.presented = hologram.seconds + ready.elapsed().as_secs_f64();
+        self.counts.shown[hologram.detail as usize] += 1;
+        match hologram.detail {
             Detail::Coarse => self.counts.to_coarse.push(self.presented),
             Detail::Middle => {}
             Detail::Full => {
                 self.counts.to_full.push(self.presented);
-                refined.frame.write(&self.args.output.join("frame.png"))?;
+                hologram.frame.write(&self.args.output.join("frame.png"))?;
             }
         }
-        let (wavelength, encoding) = (refined.frame.metadata.wavelength, self.encoding(&refined));
+        let (wavelength, encoding) = (hologram.frame.metadata.wavelength, self.encoding(&hologram));
         self.event(&json!({
-            "event": "shown", "version": refined.version, "detail": refined.detail,
-            "points": refined.lit.placed.cloud.points.len(), "since_wish": self.presented,
-            "light_seconds": refined.light_seconds, "field_seconds": refined.field.seconds,
-            "encode_seconds": refined.encode_seconds, "wavelength": wavelength, "encoding": encoding,
+            "event": "shown", "version": hologram.version, "detail": hologram.detail,
+            "points": hologram.points.placed.cloud.points.len(), "since_wish": self.presented,
+            "light_seconds": hologram.light_seconds, "field_seconds": hologram.field.seconds,
+            "encode_seconds": hologram.encode_seconds, "wavelength": wavelength, "encoding": encoding,
             "turn": self.controls.turn.map(|steps| f64::from(steps) * TURN_STEP),
             "shift": self.controls.shifted().to_array(),
         }));
-        self.newest = Some(refined);
+        self.newest = Some(hologram);
         self.ask();
         self.redraw()
     }
 
-    fn encoding(&self, refined: &Refined) -> String {
-        refined.frame.metadata.encoding.as_ref().map(|encoding| encoding.method.clone()).unwrap_or_default()
+    fn encoding(&self, hologram: &LiveHologram) -> String {
+        hologram.frame.metadata.encoding.as_ref().map(|encoding| encoding.method.clone()).unwrap_or_default()
     }
 
     /// Shows the operator what has been reconstructed.
@@ -307,7 +318,7 @@ impl Live<'_> {
         let degrees = self.controls.turn.map(|steps| 5 * steps);
         let [x, y, z] = (1e3 * self.controls.shifted()).to_array();
         if let Some(newest) = &self.newest {
-            let points = count(newest.lit.placed.cloud.points.len()).replace('\u{202f}', " ");
+            let points = count(newest.points.placed.cloud.points.len()).replace('\u{202f}', " ");
             lines.push(("hologram", format!("{} {}, {points} points", newest.version, newest.detail.name())));
             lines.push(("light", seconds(newest.light_seconds)));
             lines.push(("field", format!("{}, {}", seconds(newest.field.seconds), newest.field.method.name())));
@@ -332,7 +343,7 @@ impl Live<'_> {
         }
         lines.push(("turned", format!("{:+}, {:+} degrees", degrees[0], degrees[1])));
         lines.push(("shifted", format!("{x:+.1}, {y:+.1}, {z:+.0} mm")));
-        lines.push(("panel", format!("{} on {}", self.panel.profile.name, self.shown.panel().monitor().name)));
+        lines.push(("panel", format!("{} on {}", self.setup.profile.name, self.shown.panel().monitor().name)));
         lines.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
     }
 

@@ -5,28 +5,29 @@ mod args;
 mod bar;
 mod bench;
 mod calibrate;
-mod colour;
-mod commands;
 #[cfg(feature = "display")]
 mod controls;
-mod encoding;
+mod encode;
+mod holograms;
 mod layers;
 mod light;
 #[cfg(feature = "display")]
 mod live;
 mod load;
 mod monitors;
-mod parallax;
+mod pictures;
 mod print;
 mod print_preview;
+mod reconstruct;
 mod refusal;
 mod report;
+mod resolve;
 #[cfg(feature = "display")]
 mod screen;
 mod sequence;
 mod serve;
 mod show;
-mod subframes;
+mod steps;
 mod true_views;
 
 use args::{Cli, Command};
@@ -34,6 +35,15 @@ use clap::FromArgMatches;
 use clap::error::ErrorKind;
 use holodrive::Error;
 use std::process::ExitCode;
+
+/// Refuses what needs a display in a build that has none.
+#[cfg(not(feature = "display"))]
+fn without_display(asked: bool) -> holodrive::Result<()> {
+    match asked {
+        true => Err(Error::unsupported("this build has no display; build it with the feature `display` (the default)")),
+        false => Ok(()),
+    }
+}
 
 /// Parses, runs and maps the outcome to an exit code: 0 done, 2 bad flags or input, 130 interrupted.
 pub(crate) fn main() -> ExitCode {
@@ -51,11 +61,11 @@ pub(crate) fn main() -> ExitCode {
     };
     let json = cli.json;
     let outcome = match cli.command {
-        Command::Points(args) => commands::points(&args),
-        Command::Compute(args) => commands::compute(&args),
-        Command::Propagate(args) => commands::propagate(&args),
-        Command::Encode(args) => encoding::encode(&args),
-        Command::Reconstruct(args) => commands::reconstruct(&args),
+        Command::Points(args) => steps::points(&args),
+        Command::Compute(args) => steps::compute(&args),
+        Command::Propagate(args) => steps::propagate(&args),
+        Command::Encode(args) => encode::encode(&args),
+        Command::Reconstruct(args) => reconstruct::reconstruct(&args),
         Command::Show(args) => show::show(&args),
         Command::Bench { what } => bench::bench(&what),
         Command::Calibrate { what } => calibrate::calibrate(&what),

@@ -1,7 +1,7 @@
 //! What a command did: lines for people, JSON for machines.
 
 use holodrive::units::show_length;
-use holodrive::{Error, Result};
+use holodrive::{Error, Result, files};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::io::Write;
@@ -90,6 +90,21 @@ impl Report {
                 show_length(far)
             )]);
         }
+    }
+    /// Adds all of another report.
+    pub(crate) fn merge(&mut self, other: Self) {
+        self.values.extend(other.values);
+        self.lines.extend(other.lines);
+        self.warnings.extend(other.warnings);
+    }
+    /// Writes it as `report.json` into the folder that holds the results, and says so.
+    pub(crate) fn written_to(mut self, folder: &Path) -> Result<Self> {
+        let shown = folder.display().to_string();
+        let line = format!("pictures and data in {shown}");
+        self.add("output", shown, line);
+        let text = serde_json::to_string_pretty(&self.json()).unwrap_or_default();
+        files::write_bytes(&folder.join("report.json"), text.as_bytes())?;
+        Ok(self)
     }
     /// The report as JSON.
     pub(crate) fn json(&self) -> Value {

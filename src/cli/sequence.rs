@@ -4,15 +4,13 @@
 use super::args::Ahead;
 use super::args::ShowArgs;
 use super::bar::Bar;
-use super::load;
 use super::report::{Report, count, seconds};
-use super::show::finish;
+use super::resolve;
 #[cfg(feature = "display")]
 use holodrive::display::{DisplayFrame, PlaySettings};
 use holodrive::field::npy_stack::LevelStack;
-use holodrive::panel::simulated::Simulation;
 use holodrive::panel::{Frame, PanelProfile};
-use holodrive::pipeline;
+use holodrive::pipeline::{self, Bench};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::{self, Picture, View};
 use holodrive::sequence::prepared::pictures_in;
@@ -83,27 +81,6 @@ pub(super) fn asked(args: &ShowArgs) -> Result<Option<Sequence>> {
     }
 }
 
-/// Plays it, or looks at each frame on the simulated panel.
-pub(super) fn show(args: &ShowArgs, sequence: Sequence, report: Report) -> Result<Report> {
-    if args.color.wavelengths.is_some() {
-        return Err(Error::parameter(
-            "wavelengths",
-            "three lasers are for one frame; leave them out with frames in time",
-        ));
-    }
-    if args.subframes != 1 {
-        return Err(Error::parameter("subframes", "are for one frame; leave them out with frames in time"));
-    }
-    #[cfg(not(feature = "display"))]
-    if args.monitor.is_some() {
-        return Err(Error::unsupported("this build has no display; build it with the feature `display` (the default)"));
-    }
-    match sequence {
-        Sequence::Animated(path) => super::animate::show(args, &path, report),
-        Sequence::Prepared(source) => prepared(args, &source, report),
-    }
-}
-
 /// Opens a prepared sequence as often as it is played.
 #[derive(Clone)]
 struct Opener {
@@ -121,7 +98,20 @@ impl Opener {
     }
 }
 
-fn prepared(args: &ShowArgs, source: &Source, mut report: Report) -> Result<Report> {
+/// Refuses what is for one frame.
+pub(super) fn check(args: &ShowArgs) -> Result<()> {
+    let refused =
+        |flag, what| Err(Error::parameter(flag, format!("{what} for one frame; leave them out with frames in time")));
+    match (args.color.wavelengths, args.subframes) {
+        (Some(_), _) => refused("wavelengths", "three lasers are"),
+        (None, 1) => Ok(()),
+        _ => refused("subframes", "are"),
+    }
+}
+
+/// Plays prepared frames, or looks at each on the simulated panel.
+pub(super) fn prepared(args: &ShowArgs, source: &Source, mut report: Report) -> Result<Report> {
+    check(args)?;
     if args.sequence.repeat && matches!(source, Source::Raw { path: None, .. }) {
         return Err(Error::parameter(
             "loop",
@@ -129,11 +119,11 @@ fn prepared(args: &ShowArgs, source: &Source, mut report: Report) -> Result<Repo
         ));
     }
     let named = args.panel.panel != "generic";
-    let panel = load::panel(&args.panel, &mut report)?;
+    let setup = resolve::setup(&args.panel, &mut report)?;
     let bar = Bar::new();
     // On a monitor the play stops the reading at its end; otherwise only Ctrl-C does.
     let stop = if args.monitor.is_some() { Arc::default() } else { Arc::clone(&bar.progress) };
-    let profile = panel.profile.clone();
+    let profile = setup.profile.clone();
     let opener = Opener { source: source.clone(), profile, named, wavelength: args.panel.wavelength, stop };
     let frames = opener.open()?;
     let notes = frames.notes();
@@ -144,7 +134,7 @@ fn prepared(args: &ShowArgs, source: &Source, mut report: Report) -> Result<Repo
         let played = Repeated { frames, again, shown: false };
         let playing = PlaySettings {
             rate: args.sequence.fps,
-            settle: panel.profile.settle_time.unwrap_or(0.0),
+            settle: setup.profile.settle_time.unwrap_or(0.0),
             making: Some(Arc::clone(&opener.stop)),
             ..screen.play_settings()
         };
@@ -161,7 +151,7 @@ fn prepared(args: &ShowArgs, source: &Source, mut report: Report) -> Result<Repo
         drop(bar);
         report.warn(notes.lock().map(|notes| notes.clone()).unwrap_or_default());
         outcome?;
-        return finish(report, &args.output);
+        return report.written_to(&args.output);
     }
     let begin = Instant::now();
     files::output_folder(&args.output)?;
@@ -188,7 +178,7 @@ fn prepared(args: &ShowArgs, source: &Source, mut report: Report) -> Result<Repo
         count(number)
     );
     report.add("seconds", elapsed, line);
-    finish(report, &args.output)
+    report.written_to(&args.output)
 }
 
 /// Where frame `number` is written.
@@ -226,13 +216,13 @@ fn simulate(
 
 fn look(args: &ShowArgs, frame: &Frame, progress: &Progress) -> Result<Picture> {
     let content = frame.metadata.origin.depth;
-    let (field, mut settings) = pipeline::simulated_light(frame, &Simulation::default(), &progress.part())?;
-    settings.block_zero_order(args.zero_order_stop, field.wavelength);
+    let bench = Bench { zero_order_stop: args.zero_order_stop, ..Bench::default() };
+    let light = pipeline::light(frame, &bench, &progress.part())?;
     let z = args.sequence.focus.unwrap_or_else(|| content.map_or(0.0, |[near, far]| 0.5 * (near + far)));
     let view = View::Plane { z };
-    let half = view.seen_half(&field.grid, None);
+    let half = view.seen_half(&light.field.grid, None);
     let size = (CELL, ((CELL as f64 * half.y / half.x).round() as usize).clamp(1, 4 * CELL));
-    reconstruction::picture(&field, &view, half, size, &settings, &progress.part())
+    reconstruction::picture(&light.field, &view, half, size, &light.settings, &progress.part())
 }
 
 /// Frames of a sequence for the monitor, again and again where that is asked.

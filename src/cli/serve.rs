@@ -2,9 +2,9 @@
 
 use super::args::{ServeArgs, ServedLevelsArg};
 use super::bar::Bar;
-use super::load::{Panel, panel, panel_correction};
 use super::report::{Report, seconds};
-use holodrive::panel::{Frame, Modulation};
+use super::resolve::{self, told_correction};
+use holodrive::panel::{Frame, Modulation, Setup};
 use holodrive::progress::Progress;
 use holodrive::serve::{
     self, Announcement, Driver, KeepReport, KeepSettings, OnClientGone, Output, ServeSettings, ServedPanel, Server,
@@ -108,8 +108,9 @@ struct Service {
 
 impl Service {
     fn resolve(args: &ServeArgs, json: bool, report: &mut Report) -> Result<Self> {
-        let panel = panel(&args.panel, report)?;
-        let correction = panel_correction(&panel, args.correction.as_deref(), report)?;
+        let panel = resolve::setup(&args.panel, report)?;
+        let panel = Setup { correction: resolve::correction(args.correction.as_deref())?, ..panel };
+        let correction = told_correction(&panel, report)?;
         report.warn(panel.profile.drive_curve(panel.wavelength)?.1);
         let driver = Driver::new(&panel.profile, panel.wavelength, correction)?;
         let idle = idle_frame(&args.idle, &panel, &driver, report)?;
@@ -159,7 +160,7 @@ fn announced(announcement: &Announcement, place: &str) -> String {
 }
 
 /// A level, or a picture of levels.
-fn idle_frame(text: &str, panel: &Panel, driver: &Driver, report: &mut Report) -> Result<Frame> {
+fn idle_frame(text: &str, panel: &Setup, driver: &Driver, report: &mut Report) -> Result<Frame> {
     if let Ok(level) = text.parse::<u16>() {
         return driver.flat(level).map_err(|_| {
             let highest = panel.profile.levels() - 1;

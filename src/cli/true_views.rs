@@ -1,11 +1,12 @@
 //! `compute --views`: the field of a scene that each segment of the panel sees from its own place.
 
 use super::args::{ComputeArgs, PlacementArg};
-use super::load::{Input, Panel};
+use super::load::Input;
 use super::print::task;
 use super::report::{Report, count, seconds};
 use holodrive::field::npy;
 use holodrive::hologram::InstructionSet;
+use holodrive::panel::Setup;
 use holodrive::print::PanelViews;
 use holodrive::progress::Progress;
 use holodrive::{Error, Result};
@@ -13,7 +14,7 @@ use holodrive::{Error, Result};
 pub(super) fn compute(
     args: &ComputeArgs,
     (source, segment): (&Input, u64),
-    panel: &Panel,
+    panel: &Setup,
     progress: &Progress,
     report: &mut Report,
 ) -> Result<()> {

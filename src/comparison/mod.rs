@@ -28,15 +28,13 @@ pub use pictures::{flat_picture, scene_picture};
 
 use crate::encode::iterative::TargetPlane;
 use crate::encode::pictures::{DepthPicture, encode_planes};
-use crate::encode::{
-    DoublePhase, EncodeSettings, Encoding, ErrorDiffusion, PlaneEncoding, PlaneMethod, PlaneStart, blaze_and_lens,
-    encode,
-};
+use crate::encode::{DoublePhase, EncodeOptions, Encoding, ErrorDiffusion, PlaneEncoding, PlaneMethod, PlaneStart};
 use crate::error::Result;
 use crate::field::{Complex32, Field, Grid};
 use crate::names::Named;
 use crate::panel::simulated::illuminate;
-use crate::panel::{Curve, Faults, Frame, Illumination, Modulation, PanelProfile, Response, Simulation, simulate};
+use crate::panel::{Curve, Faults, Frame, Illumination, Modulation, Origin, PanelProfile, Response, Setup, Simulation};
+use crate::pipeline::{self, Bench};
 use crate::progress::Progress;
 use crate::propagation::{Propagator, Settings};
 use crate::reconstruction::metrics;
@@ -60,10 +58,19 @@ pub struct Effort {
 pub struct ComparedPanel {
     /// What the table calls it.
     pub name: &'static str,
-    /// The panel.
-    pub profile: PanelProfile,
+    /// The panel in its light.
+    pub setup: Setup,
     /// What it does beside its profile.
     pub faults: Faults,
+}
+
+/// A picture to encode.
+#[derive(Clone, Debug)]
+pub struct ComparedPicture {
+    /// What the table calls it.
+    pub name: String,
+    /// The picture and where its pixels stand.
+    pub picture: DepthPicture,
 }
 
 /// A line of the table; all figures are simulated.
@@ -106,8 +113,7 @@ pub fn panels(width: usize, height: usize) -> Result<Vec<ComparedPanel>> {
         profile.signal.width = width;
         profile.signal.height = height;
         profile.responses = vec![Response { wavelength: None, curve: Curve::Linear { levels_for_2pi } }];
-        profile.grid()?;
-        Ok(ComparedPanel { name, profile, faults: Faults::default() })
+        Ok(ComparedPanel { name, setup: Setup::new(profile, None)?, faults: Faults::default() })
     };
     Ok(vec![
         panel("ideal", 16, 1.0, 65536.0, 0.0)?,
@@ -130,28 +136,23 @@ pub fn encodings() -> Vec<&'static str> {
 /// # Errors
 /// Those of the encoding and of the simulation; [`crate::Error::Interrupted`] when asked to stop.
 pub fn compare(
-    (title, picture): (&str, &DepthPicture),
+    compared: &ComparedPicture,
     panel: &ComparedPanel,
     name: &'static str,
     effort: Effort,
     progress: &Progress,
 ) -> Result<Row> {
-    let grid = panel.profile.grid()?;
-    let wavelength = panel.profile.default_wavelength();
+    let (picture, setup) = (&compared.picture, &panel.setup);
+    let grid = setup.grid;
     let planes = picture.planes(&grid, WINDOW)?;
-    let encoding = Encoding::named(name)?;
-    let field = match encoding {
-        Encoding::Planes(_) => None,
-        _ => Some(field_of(&planes, grid, wavelength, progress)?),
-    };
-    let begin = Instant::now();
-    let frame = match (encoding, field) {
-        (Encoding::Planes(settings), _) => {
-            by_planes(planes.clone(), &panel.profile, wavelength, settings, effort, progress)?
+    let mut begin = Instant::now();
+    let frame = match Encoding::named(name)? {
+        Encoding::Planes(settings) => by_planes(planes.clone(), setup, settings, effort, progress)?,
+        encoding => {
+            let field = field_of(&planes, grid, setup.wavelength, progress)?;
+            begin = Instant::now();
+            by_field(&field, setup, encoding, effort, progress)?
         }
-        (encoding, Some(field)) => by_field(&field, &panel.profile, encoding, effort, progress)?,
-        // A field is made for every other encoding, above.
-        (_, None) => return Err(crate::Error::parameter("encoding", "needs a field")),
     };
     let seconds = begin.elapsed().as_secs_f64();
     let seen = measure(&frame, &planes, &panel.faults, progress)?;
@@ -170,7 +171,7 @@ pub fn compare(
         metrics::ssim(&shown, &wanted, columns.len(), rows.len())
     };
     Ok(Row {
-        picture: title.into(),
+        picture: compared.name.clone(),
         panel: panel.name,
         encoding: name,
         psnr: seen.psnr,
@@ -196,8 +197,7 @@ fn field_of(planes: &[TargetPlane], grid: Grid, wavelength: f64, progress: &Prog
 
 fn by_planes(
     planes: Vec<TargetPlane>,
-    profile: &PanelProfile,
-    wavelength: f64,
+    setup: &Setup,
     settings: PlaneEncoding,
     effort: Effort,
     progress: &Progress,
@@ -208,13 +208,13 @@ fn by_planes(
         _ => effort.start,
     };
     let settings = PlaneEncoding { iterations: effort.iterations, start, ..settings };
-    let (made, _) = encode_planes(planes, wavelength, profile, &settings, (None, Illumination::Normal), progress)?;
-    Ok(made.frame)
+    let beside = (None, Illumination::Normal);
+    Ok(encode_planes(planes, setup.wavelength, &setup.profile, &settings, beside, progress)?.0.frame)
 }
 
 fn by_field(
     field: &Field,
-    profile: &PanelProfile,
+    setup: &Setup,
     mut encoding: Encoding,
     effort: Effort,
     progress: &Progress,
@@ -226,23 +226,23 @@ fn by_field(
         Encoding::Gradient(settings) => (settings.band, settings.iterations) = (band, effort.iterations),
         _ => {}
     }
-    let phase = encoding.modulation() == Modulation::Phase;
+    let angle = |limit: f64| (0.5 * limit * field.wavelength).asin();
+    let blaze = match encoding.modulation() {
+        Modulation::Phase => [angle(field.grid.limit_x()), angle(field.grid.limit_y())],
+        Modulation::Amplitude => [0.0; 2],
+    };
     let one_side = matches!(encoding, Encoding::SingleSideBand(_));
-    let mut settings = EncodeSettings::new(encoding);
-    if phase {
-        let angle = |limit: f64| (0.5 * limit * field.wavelength).asin();
-        let angles = [angle(field.grid.limit_x()), angle(field.grid.limit_y())];
-        settings.illumination = blaze_and_lens(angles, None, field.wavelength)?;
-    }
+    let options = EncodeOptions { encoding: Some(encoding), blaze, ..EncodeOptions::default() };
+    let encode = |field: &Field| pipeline::frame(field, setup, &options, Origin::default(), progress);
     if !one_side {
-        return Ok(encode(field, profile, &settings, progress)?.frame);
+        return Ok(encode(field)?.frame);
     }
     // The upper half of the band has its middle at half the limit: there the object goes, and light from the other side
     // brings it back.
     let middle = [0.0, 0.5 * field.grid.limit_y()];
     let mut moved = field.clone();
     illuminate(&mut moved.samples, field.grid, field.wavelength, Illumination::Plane { frequency: middle })?;
-    let mut frame = encode(&moved, profile, &settings, progress)?.frame;
+    let mut frame = encode(&moved)?.frame;
     if let Some(record) = &mut frame.metadata.encoding {
         record.illumination = Illumination::Plane { frequency: middle.map(|f| -f) };
         if let Some(aperture) = &mut record.aperture {
@@ -252,8 +252,8 @@ fn by_field(
     Ok(frame)
 }
 
-/// What is seen of a frame.
-struct Seen {
+/// What is seen of a frame on the planes of its picture.
+struct Measured {
     /// Scaled amplitudes on each plane.
     amplitudes: Vec<Vec<f32>>,
     /// Greatest wanted amplitude.
@@ -264,13 +264,15 @@ struct Seen {
     speckle: f64,
 }
 
-fn measure(frame: &Frame, planes: &[TargetPlane], faults: &Faults, progress: &Progress) -> Result<Seen> {
-    let behind = simulate(frame, &Simulation { faults: faults.clone(), ..Simulation::default() }, progress)?;
-    let aperture = frame.metadata.encoding.as_ref().and_then(|encoding| encoding.aperture);
+fn measure(frame: &Frame, planes: &[TargetPlane], faults: &Faults, progress: &Progress) -> Result<Measured> {
+    let bench =
+        Bench { simulation: Simulation { faults: faults.clone(), ..Simulation::default() }, ..Bench::default() };
+    let light = pipeline::light(frame, &bench, progress)?;
+    let behind = &light.field;
     let propagator = Propagator::new(behind.grid, behind.grid, Settings::default())?;
     let mut amplitudes = Vec::new();
     for plane in planes {
-        let light = propagator.propagate_through(&behind, plane.z, aperture.as_ref(), progress)?;
+        let light = propagator.propagate_through(behind, plane.z, light.settings.aperture.as_ref(), progress)?;
         amplitudes.push(light.samples.iter().map(|u| u.norm()).collect::<Vec<f32>>());
     }
     let counted = |k: usize, i: usize| planes[k].weight.as_ref().map_or(1.0, |w| f64::from(w[i]));
@@ -300,12 +302,14 @@ fn measure(frame: &Frame, planes: &[TargetPlane], faults: &Faults, progress: &Pr
             ratios.push((seen / wanted).powi(2));
         }
     }
+    // The light is that of the field that was encoded: what the panel really sends is its scale squared.
+    let power = frame.metadata.encoding.as_ref().map_or(1.0, |encoding| encoding.scale.powi(2));
     let decibel = |(sum, count): (f64, usize)| -10.0 * (sum / count.max(1) as f64 / f64::from(peak).powi(2)).log10();
     let all = squares.iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-    Ok(Seen {
+    Ok(Measured {
         psnr: decibel(all),
         psnr_planes: squares.into_iter().map(decibel).collect(),
-        efficiency: own / behind.samples.len() as f64,
+        efficiency: own * power / behind.samples.len() as f64,
         speckle: metrics::speckle_contrast(&ratios),
         amplitudes,
         peak,

@@ -2,10 +2,10 @@
 
 use crate::encode::pictures::DepthPicture;
 use crate::error::Result;
-use crate::panel::PanelProfile;
-use crate::pipeline::{SceneSettings, light};
-use crate::points::Channel;
+use crate::panel::{PanelProfile, Setup};
+use crate::pipeline;
 use crate::points::trace::TraceSettings;
+use crate::points::{Channel, SceneSettings};
 use crate::progress::Progress;
 use std::path::Path;
 
@@ -60,17 +60,16 @@ pub fn flat_picture(profile: &PanelProfile) -> DepthPicture {
 /// A scene's traced picture, sorted by depth into `planes` slices of equal thickness.
 ///
 /// # Errors
-/// As [`light`].
-pub fn scene_picture(scene: &Path, profile: &PanelProfile, planes: usize, progress: &Progress) -> Result<DepthPicture> {
-    let grid = profile.grid()?;
+/// As [`pipeline::points`].
+pub fn scene_picture(scene: &Path, setup: &Setup, planes: usize, progress: &Progress) -> Result<DepthPicture> {
+    let profile = &setup.profile;
     let side = (0.75 * profile.height as f64 / 2.0).round().max(16.0) as u32;
     let settings = SceneSettings {
         trace: TraceSettings { width: side, height: side, ..TraceSettings::default() },
         ..SceneSettings::default()
     };
-    let lit = light(scene, &settings, &grid, profile.default_wavelength(), progress)?;
-    let view = &lit.view;
-    let white = lit.white.white;
+    let points = pipeline::points(scene, &settings, setup, progress)?;
+    let (view, white) = (&points.view, points.white.white);
     let values: Vec<f32> =
         view.picture.iter().map(|rgb| Channel::Luminance.of(*rgb).clamp(0.0, white) / white).collect();
     let farthest = view.depths.iter().flatten().fold(0.0f64, |a, &z| a.min(z));

@@ -4,9 +4,9 @@ use super::*;
 
 fn row(panel: usize, name: &'static str, iterations: usize) -> Row {
     let panels = panels(192, 144).expect("panels");
-    let picture = flat_picture(&panels[0].profile);
+    let picture = ComparedPicture { name: "flat".into(), picture: flat_picture(&panels[0].setup.profile) };
     compare(
-        ("flat", &picture),
+        &picture,
         &panels[panel],
         name,
         Effort { iterations, start: PlaneStart::Random { seed: 1 } },
@@ -40,15 +40,16 @@ fn every_encoding_makes_a_line_and_worse_panels_are_worse() {
 #[test]
 fn three_planes_pass_their_targets_on_an_eight_bit_panel() {
     let panels = panels(192, 144).expect("panels");
-    let flat = flat_picture(&panels[1].profile);
+    let flat = flat_picture(&panels[1].setup.profile);
     // Thirds of the picture from left to right, on three planes.
     let z: Vec<f64> = (0..flat.light.len()).map(|i| -((3 * (i % flat.width) / flat.width) as f64)).collect();
     let (near, far) = (-7.5e-3, -15e-3);
     let plane = z.iter().map(|z| (-z) as usize).collect();
     let picture = DepthPicture { plane, depths: vec![near, 0.5 * (near + far), far], ..flat };
+    let picture = ComparedPicture { name: "thirds".into(), picture };
     for name in ["plane-gradient", "weighted"] {
         let effort = Effort { iterations: 300, start: PlaneStart::Random { seed: 1 } };
-        let found = compare(("thirds", &picture), &panels[1], name, effort, &Progress::new()).expect(name);
+        let found = compare(&picture, &panels[1], name, effort, &Progress::new()).expect(name);
         println!("{name}: {:.1?} dB, efficiency {:.3}", found.psnr_planes, found.efficiency);
         assert!(found.psnr_planes.len() == 3 && found.psnr_planes.iter().all(|p| *p > 30.0), "{found:?}");
     }

@@ -34,6 +34,7 @@ mod iterated;
 pub mod iterative;
 pub mod kinoform;
 pub mod off_axis;
+mod options;
 pub mod pictures;
 
 pub use binary::{Binarisation, BinaryFringe};
@@ -43,6 +44,7 @@ pub use error_diffusion::ErrorDiffusion;
 pub use fringe::Quantity;
 pub use iterated::{BandGradient, PlaneEncoding, PlaneMethod, PlaneStart};
 pub use off_axis::{OffAxis, Reference};
+pub use options::EncodeOptions;
 
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Complex64, Field};
@@ -128,6 +130,14 @@ fn binary(method: Binarisation) -> Encoding {
 }
 
 impl Encoding {
+    /// The usual encoding for what a panel modulates.
+    pub fn usual(modulation: Modulation) -> Self {
+        match modulation {
+            Modulation::Amplitude => Self::OffAxisBipolar(OffAxis::default()),
+            Modulation::Phase => Self::DoublePhase(DoublePhase::default()),
+        }
+    }
+
     /// What its pattern modulates.
     pub fn modulation(&self) -> Modulation {
         match self {

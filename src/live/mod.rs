@@ -1,7 +1,7 @@
 //! A hologram that follows its scene: computed again when the scene's file changes or somebody moves it, coarse at once and
 //! finer while nothing moves.
 //!
-//! A [`Worker`] computes on a thread of its own. A new [`Wish`] stops what is running and begins with the coarse level; the
+//! A [`Worker`] computes on a thread of its own. A new [`Request`] stops what is running and begins with the coarse level; the
 //! light on surfaces is kept as long as the file is the same, since turning the scene only moves the eye. A file that
 //! cannot be read is told, and the last good scene stays. [`Watch`] sees files change. A [`Viewer`] reconstructs what an eye
 //! sees of the newest hologram, and [`draw`] puts the operator's view together.
@@ -13,6 +13,6 @@ mod watch;
 mod worker;
 
 pub use view::{Board, Histogram, PICTURE, SIZE, draw};
-pub use viewer::{Look, Seen, Viewer, reconstruct};
+pub use viewer::{Look, OperatorPicture, Viewer, reconstruct};
 pub use watch::Watch;
-pub use worker::{Detail, Happened, Refined, Wish, Worker};
+pub use worker::{Detail, LiveHologram, Request, Worker, WorkerEvent};

@@ -1,15 +1,13 @@
 //! What an eye sees of the newest hologram, reconstructed on a thread of its own.
 
 use super::background::{Background, Desk};
-use super::worker::{Detail, Refined};
+use super::worker::{Detail, LiveHologram};
 use crate::error::{Error, Result};
-use crate::field::Field;
 use crate::panel::Frame;
-use crate::panel::simulated::Simulation;
-use crate::pipeline;
+use crate::pipeline::{self, Bench};
 use crate::points::placement::Placing;
 use crate::progress::Progress;
-use crate::reconstruction::{self, Picture, View, ViewSettings};
+use crate::reconstruction::{self, ExposureLight, Picture, View};
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::time::Instant;
@@ -23,8 +21,6 @@ pub struct Look {
     pub eye: Option<[f64; 2]>,
     /// Diameter of the eye's pupil [m].
     pub pupil: f64,
-    /// Angle about the axis that a stop for the zero order blocks [rad].
-    pub zero_order_stop: f64,
 }
 
 impl Look {
@@ -40,10 +36,10 @@ impl Look {
     }
 }
 
-/// A picture of a hologram.
+/// What the operator sees of a hologram.
 #[derive(Clone, Debug)]
-pub struct Seen {
-    /// Number of the wish.
+pub struct OperatorPicture {
+    /// Number of the request.
     pub version: u64,
     /// How fine the hologram is.
     pub detail: Detail,
@@ -55,48 +51,46 @@ pub struct Seen {
     pub seconds: f64,
 }
 
-/// The picture of a frame on the simulated panel.
+/// The picture of a frame on the simulated bench.
 ///
 /// # Errors
-/// As [`pipeline::simulated_light`] and [`reconstruction::picture`].
+/// As [`pipeline::light`] and [`reconstruction::picture`].
 pub fn reconstruct(
     frame: &Frame,
     placing: &Placing,
     look: &Look,
     size: (usize, usize),
+    bench: &Bench,
     progress: &Progress,
 ) -> Result<Picture> {
-    let behind = pipeline::simulated_light(frame, &Simulation::default(), progress)?;
-    of_light(&behind, placing, look, size, progress)
+    of_light(&pipeline::light(frame, bench, progress)?, placing, look, size, progress)
 }
 
 fn of_light(
-    (field, settings): &(Field, ViewSettings),
+    light: &ExposureLight,
     placing: &Placing,
     look: &Look,
     size: (usize, usize),
     progress: &Progress,
 ) -> Result<Picture> {
-    let mut settings = *settings;
-    settings.block_zero_order(look.zero_order_stop, field.wavelength);
     let half = placing.view_at(look.focus);
-    reconstruction::picture(field, &look.view(placing), half, size, &settings, progress)
+    reconstruction::picture(&light.field, &look.view(placing), half, size, &light.settings, progress)
 }
 
 /// What is to be looked at next.
-type Order = Option<(Arc<Refined>, Look)>;
+type Order = Option<(Arc<LiveHologram>, Look)>;
 
 /// Reconstructs what was last asked for; ends when it is dropped.
-pub struct Viewer(Background<Order, Result<Seen>>);
+pub struct Viewer(Background<Order, Result<OperatorPicture>>);
 
 impl Viewer {
-    /// A viewer whose pictures have this size (columns, rows) [px].
-    pub fn start(size: (usize, usize)) -> Self {
-        Self(Background::start(None, move |desk, tell| work(desk, size, tell)))
+    /// A viewer whose pictures have this size (columns, rows) [px], of light on this bench.
+    pub fn start(size: (usize, usize), bench: Bench) -> Self {
+        Self(Background::start(None, move |desk, tell| work(desk, size, &bench, tell)))
     }
 
     /// Asks for a picture of this hologram; one that is being made is given up.
-    pub fn ask(&self, hologram: &Arc<Refined>, look: Look) {
+    pub fn ask(&self, hologram: &Arc<LiveHologram>, look: Look) {
         self.0.ask(|order| *order = Some((Arc::clone(hologram), look)));
     }
 
@@ -104,26 +98,26 @@ impl Viewer {
     ///
     /// # Errors
     /// Those of [`reconstruct`].
-    pub fn poll(&self) -> Result<Option<Seen>> {
+    pub fn poll(&self) -> Result<Option<OperatorPicture>> {
         self.0.poll("the reconstruction")?.transpose()
     }
 }
 
-fn work(desk: &Desk<Order>, size: (usize, usize), tell: &Sender<Result<Seen>>) {
+fn work(desk: &Desk<Order>, size: (usize, usize), bench: &Bench, tell: &Sender<Result<OperatorPicture>>) {
     // The light of one hologram serves all looks at it.
-    let mut light: Option<((u64, Detail), (Field, ViewSettings))> = None;
+    let mut light: Option<((u64, Detail), ExposureLight)> = None;
     while let Some(((hologram, look), running)) = desk.next(Option::take) {
         let begin = Instant::now();
         let known = (hologram.version, hologram.detail);
         let made = (|| {
             if light.as_ref().is_none_or(|(of, _)| *of != known) {
-                light = Some((known, pipeline::simulated_light(&hologram.frame, &Simulation::default(), &running)?));
+                light = Some((known, pipeline::light(&hologram.frame, bench, &running)?));
             }
             let Some((_, light)) = &light else { return Err(Error::Interrupted) };
-            let picture = of_light(light, &hologram.lit.view.placing, &look, size, &running)?;
+            let picture = of_light(light, &hologram.points.view.placing, &look, size, &running)?;
             running.check()?;
             let seconds = begin.elapsed().as_secs_f64();
-            Ok(Seen { version: hologram.version, detail: hologram.detail, look, picture, seconds })
+            Ok(OperatorPicture { version: hologram.version, detail: hologram.detail, look, picture, seconds })
         })();
         if !matches!(made, Err(Error::Interrupted)) && tell.send(made).is_err() {
             return;

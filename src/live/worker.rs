@@ -1,16 +1,15 @@
-//! The thread that computes what was last wished for.
+//! The thread that computes what was last requested.
 
 use super::background::{Background, Desk};
-use crate::encode::{EncodeSettings, Encoding};
+use crate::encode::{EncodeOptions, Encoding};
 use crate::error::{Error, Result};
 use crate::hologram::{HologramReport, HologramSettings};
-use crate::illumination::Illumination;
-use crate::panel::{Frame, PanelProfile};
-use crate::pipeline::{self, Lit, SceneSettings};
-use crate::points::Channel;
+use crate::panel::{Frame, Modulation, Origin, Setup};
+use crate::pipeline::{self, Settings};
 use crate::points::trace::TraceSettings;
+use crate::points::{LitScene, ScenePoints, SceneSettings};
 use crate::progress::Progress;
-use crate::scene::{Camera, SceneBvh, gltf};
+use crate::scene::{Camera, Scene, SceneBvh, gltf};
 use glam::{DMat4, DVec3};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -27,7 +26,7 @@ const MIDDLE_SHARE: f64 = 0.5;
 
 /// How the scene should stand before the panel, and in which light and encoding.
 #[derive(Clone, Debug)]
-pub struct Wish {
+pub struct Request {
     /// The scene turned about its middle: to the right about the camera's up, and up about its right [rad].
     pub turn: [f64; 2],
     /// The hologram shifted along x, y and z [m].
@@ -35,7 +34,7 @@ pub struct Wish {
     /// Wavelength [m].
     pub wavelength: f64,
     /// How the field is encoded.
-    pub encode: EncodeSettings,
+    pub encode: EncodeOptions,
 }
 
 /// How fine a hologram is.
@@ -64,43 +63,44 @@ impl Detail {
     }
 }
 
-/// One level of one wish.
+/// A hologram of one level of detail for one request.
 #[derive(Clone, Debug)]
-pub struct Refined {
-    /// Number of the wish.
+pub struct LiveHologram {
+    /// Number of the request.
     pub version: u64,
     /// How fine it is.
     pub detail: Detail,
     /// Levels for the panel.
     pub frame: Frame,
-    /// Points and picture, where they stand for this wish.
-    pub lit: Arc<Lit>,
+    /// Points and picture, where they stand for this request.
+    pub points: Arc<ScenePoints>,
     /// What the field took.
     pub field: HologramReport,
     /// Time that light and rays took [s].
     pub light_seconds: f64,
     /// Time that the encoding took [s].
     pub encode_seconds: f64,
-    /// Since the wish [s].
+    /// Since the request [s].
     pub seconds: f64,
 }
 
 /// What a worker tells.
 #[derive(Debug)]
-pub enum Happened {
+pub enum WorkerEvent {
     /// A hologram is ready.
-    Refined(Box<Refined>),
+    Ready(Box<LiveHologram>),
     /// The scene was read again: the files that it is made of now.
     Loaded(Vec<PathBuf>),
-    /// The scene or the wish is at fault: one line. What was there stays.
+    /// The scene or the request is at fault: one line. What was there stays.
     Failed(String),
-    /// A computation was stopped, so long after the new wish [s].
+    /// A computation was stopped, so long after the new request [s].
     Cancelled(f64),
 }
 
 /// What the worker is to do.
+#[derive(Clone)]
 struct Order {
-    wish: Wish,
+    request: Request,
     version: u64,
     since: Instant,
     /// Whether the file is to be read again.
@@ -108,42 +108,34 @@ struct Order {
 }
 
 /// Computes on a thread of its own; ends when it is dropped.
-pub struct Worker(Background<Order, Happened>);
+pub struct Worker(Background<Order, WorkerEvent>);
 
 /// What does not change while it runs.
-struct Job {
+struct Studio {
     path: PathBuf,
-    scene: SceneSettings,
-    profile: PanelProfile,
-    channel: Channel,
-    hologram: HologramSettings,
+    setup: Setup,
+    settings: Settings,
 }
 
 impl Worker {
-    /// Reads the scene, and begins to compute the first wish. Also gives the files that the scene is made of.
+    /// Reads the scene, and begins to compute the first request; encoding and wavelength are the request's, all else is the
+    /// settings'. Also gives the files that the scene is made of.
     ///
     /// # Errors
     /// As [`gltf::load`]: a scene that cannot be read at the beginning is not waited for.
-    pub fn start(
-        path: &Path,
-        scene: SceneSettings,
-        (profile, channel): (PanelProfile, Channel),
-        hologram: HologramSettings,
-        wish: Wish,
-    ) -> Result<(Self, Vec<PathBuf>)> {
-        profile.grid()?;
+    pub fn start(path: &Path, setup: Setup, settings: Settings, request: Request) -> Result<(Self, Vec<PathBuf>)> {
         let mut file = gltf::File::open(path)?;
         let files = file.files();
-        let first = file.pose(&scene.load)?;
-        let order = Order { wish, version: 1, since: Instant::now(), reload: false };
-        let job = Job { path: path.into(), scene, profile, channel, hologram };
-        Ok((Self(Background::start(order, move |desk, tell| job.work(first, desk, tell))), files))
+        let first = file.pose(&settings.scene.load)?;
+        let order = Order { request, version: 1, since: Instant::now(), reload: false };
+        let studio = Studio { path: path.into(), setup, settings };
+        Ok((Self(Background::start(order, move |desk, tell| studio.work(first, desk, tell))), files))
     }
 
-    /// Wishes for something else; `reload` reads the file again. What is running is stopped. The number of the wish.
-    pub fn wish(&self, wish: Wish, reload: bool) -> u64 {
+    /// Requests something else; `reload` reads the file again. What is running is stopped. The number of the request.
+    pub fn request(&self, request: Request, reload: bool) -> u64 {
         self.0.ask(|order| {
-            order.wish = wish;
+            order.request = request;
             order.version += 1;
             order.since = Instant::now();
             order.reload |= reload;
@@ -155,51 +147,68 @@ impl Worker {
     ///
     /// # Errors
     /// [`Error::Unsupported`] when the worker's thread has come to an unforeseen end.
-    pub fn poll(&self) -> Result<Option<Happened>> {
+    pub fn poll(&self) -> Result<Option<WorkerEvent>> {
         self.0.poll("the computation")
     }
 }
 
-impl Job {
-    fn work(&self, first: gltf::Loaded, desk: &Desk<Order>, told: &Sender<Happened>) {
+/// A scene with the light of its two levels, coarse and full, as far as they were needed.
+struct Lights {
+    loaded: gltf::Loaded,
+    bvh: Arc<SceneBvh>,
+    lit: [Option<LitScene>; 2],
+}
+
+impl Lights {
+    fn new(loaded: gltf::Loaded) -> Self {
+        Self { bvh: Arc::new(SceneBvh::new(loaded.scene.clone())), loaded, lit: [None, None] }
+    }
+
+    fn at(&mut self, detail: Detail, path: &Path, settings: &SceneSettings, progress: &Progress) -> Result<&LitScene> {
+        let slot = &mut self.lit[usize::from(detail != Detail::Coarse)];
+        Ok(match slot {
+            Some(lit) => lit,
+            None => {
+                let (loaded, bvh) = (self.loaded.clone(), self.bvh.clone());
+                slot.insert(LitScene::with_bvh(path, loaded, bvh, settings.illumination, progress)?)
+            }
+        })
+    }
+}
+
+impl Studio {
+    fn work(&self, first: gltf::Loaded, desk: &Desk<Order>, told: &Sender<WorkerEvent>) {
         // Where whoever asked has gone, the next look at the order ends the thread.
-        let tell = |happened| drop(told.send(happened));
-        let mut loaded = first;
+        let tell = |event| drop(told.send(event));
+        let mut lights = Lights::new(first);
         let mut done = 0;
-        // The light belongs to one scene: another scene begins the loop again.
-        'scenes: loop {
-            let bvh = Arc::new(SceneBvh::new(loaded.scene.clone()));
-            let mut lights: [Option<Illumination>; 2] = [None, None];
-            loop {
-                let next = desk.next(|order| {
-                    let new = order.version != done;
-                    new.then(|| (order.wish.clone(), order.version, order.since, std::mem::take(&mut order.reload)))
-                });
-                let Some(((wish, version, since, reload), running)) = next else { return };
-                if reload {
-                    match self.load() {
-                        Ok((files, next)) => {
-                            tell(Happened::Loaded(files));
-                            drop(lights);
-                            loaded = next;
-                            continue 'scenes;
-                        }
-                        Err(error) => tell(Happened::Failed(error.to_string())),
+        loop {
+            let next = desk.next(|order| {
+                let new = order.version != done;
+                new.then(|| Order { reload: std::mem::take(&mut order.reload), ..order.clone() })
+            });
+            let Some((order, running)) = next else { return };
+            if order.reload {
+                match self.load() {
+                    Ok((files, next)) => {
+                        tell(WorkerEvent::Loaded(files));
+                        lights = Lights::new(next);
                     }
+                    Err(error) => tell(WorkerEvent::Failed(error.to_string())),
                 }
-                done = version;
-                for detail in self.levels() {
-                    match self.compute(detail, (&wish, version, since), (&loaded, &bvh), &mut lights, &running) {
-                        Ok(refined) => tell(Happened::Refined(Box::new(refined))),
-                        Err(Error::Interrupted) => {
-                            let since = desk.look(|order| order.since);
-                            tell(Happened::Cancelled(since.elapsed().as_secs_f64()));
-                            break;
-                        }
-                        Err(error) => {
-                            tell(Happened::Failed(error.to_string()));
-                            break;
-                        }
+            }
+            done = order.version;
+            for detail in self.levels() {
+                match self.compute(detail, &order, &mut lights, &running) {
+                    Ok(hologram) => tell(WorkerEvent::Ready(Box::new(hologram))),
+                    Err(Error::Interrupted) => {
+                        let since = desk.look(|order| order.since);
+                        tell(WorkerEvent::Cancelled(since.elapsed().as_secs_f64()));
+                        break;
+                    }
+                    Err(error) => {
+                        tell(WorkerEvent::Failed(error.to_string()));
+                        break;
                     }
                 }
             }
@@ -208,67 +217,65 @@ impl Job {
 
     fn load(&self) -> Result<(Vec<PathBuf>, gltf::Loaded)> {
         let mut file = gltf::File::open(&self.path)?;
-        let loaded = file.pose(&self.scene.load)?;
+        let loaded = file.pose(&self.settings.scene.load)?;
         Ok((file.files(), loaded))
     }
 
-    fn compute(
-        &self,
-        detail: Detail,
-        (wish, version, since): (&Wish, u64, Instant),
-        (loaded, bvh): (&gltf::Loaded, &Arc<SceneBvh>),
-        lights: &mut [Option<Illumination>; 2],
-        progress: &Progress,
-    ) -> Result<Refined> {
+    fn compute(&self, detail: Detail, order: &Order, lights: &mut Lights, progress: &Progress) -> Result<LiveHologram> {
         let begin = Instant::now();
+        let request = &order.request;
         let settings = self.scene_at(detail);
-        let light = &mut lights[usize::from(detail != Detail::Coarse)];
-        let light = match light {
-            Some(light) => light,
-            None => light.insert(Illumination::new(bvh.clone(), settings.illumination, progress)?),
-        };
-        let camera = loaded.scene.cameras.first().ok_or_else(|| Error::input(&self.path, "has no camera"))?;
-        let camera = turned(camera, loaded, wish.turn);
-        let grid = self.profile.grid()?;
-        let at = (&grid, wish.wavelength);
-        let mut lit = pipeline::seen(&self.path, (loaded, &camera), light, &settings, at, progress)?;
-        shift(&mut lit, wish.shift);
+        let setup = Setup { wavelength: request.wavelength, ..self.setup.clone() };
+        let lit = lights.at(detail, &self.path, &settings, progress)?;
+        let camera = turned(lit.camera(), lit.scene(), request.turn);
+        let mut points = lit.points(&camera, &settings, &setup.grid, setup.wavelength, progress)?;
+        shift(&mut points, request.shift);
         let light_seconds = begin.elapsed().as_secs_f64();
-        let wanted = match detail {
-            Detail::Coarse => self.hologram.error.max(3e-2),
-            Detail::Middle => self.hologram.error.max(1e-2),
-            Detail::Full => self.hologram.error,
+        let error = self.settings.hologram.error;
+        let error = match detail {
+            Detail::Coarse => error.max(3e-2),
+            Detail::Middle => error.max(1e-2),
+            Detail::Full => error,
         };
-        let hologram = HologramSettings { error: wanted, ..self.hologram };
-        let cloud = &lit.placed.cloud;
-        let computed = pipeline::field(cloud, self.channel, &grid, wish.wavelength, &hologram, progress)?;
+        let hologram = HologramSettings { error, ..self.settings.hologram };
+        let cloud = &points.placed.cloud;
+        let [exposure, ..] = pipeline::exposures(&setup, &self.settings, None)[..] else {
+            return Err(Error::parameter("exposures", "there is none"));
+        };
+        let computed = pipeline::field(cloud, &exposure, &setup, &hologram, progress)?;
+        let computed = computed.ok_or_else(|| Error::input(&self.path, "has no light for this laser"))?;
         let begin = Instant::now();
-        let mut encode = wish.encode.clone();
-        if let (Encoding::DoublePhase(settings), true) = (&mut encode.encoding, detail != Detail::Full) {
-            // The best percentile of a field of random phases is near it, and is not looked for.
-            settings.percentile = settings.percentile.or(Some(USUAL_PERCENTILE));
+        let mut encode = request.encode.clone();
+        if setup.profile.modulation() == Modulation::Phase && detail != Detail::Full {
+            let usual = || Encoding::usual(Modulation::Phase);
+            if let Encoding::DoublePhase(settings) = encode.encoding.get_or_insert_with(usual) {
+                // The best percentile of a field of random phases is near it, and is not looked for.
+                settings.percentile = settings.percentile.or(Some(USUAL_PERCENTILE));
+            }
         }
-        let mut encoded = pipeline::frame(&computed.field, &self.profile, &encode, progress)?;
+        let origin = Origin {
+            source: Some(self.path.display().to_string()),
+            points: Some(cloud.points.len()),
+            depth: points.content().depth,
+            ..Origin::default()
+        };
+        let encoded = pipeline::frame(&computed.field, &setup, &encode, origin, progress)?;
         progress.check()?;
-        let origin = &mut encoded.frame.metadata.origin;
-        origin.source = Some(self.path.display().to_string());
-        origin.points = Some(cloud.points.len());
-        origin.depth = cloud.depth_range().map(|(far, near)| [near, far]);
-        Ok(Refined {
-            version,
+        Ok(LiveHologram {
+            version: order.version,
             detail,
             frame: encoded.frame,
-            lit: Arc::new(lit),
+            points: Arc::new(points),
             field: computed.report,
             light_seconds,
             encode_seconds: begin.elapsed().as_secs_f64(),
-            seconds: since.elapsed().as_secs_f64(),
+            seconds: order.since.elapsed().as_secs_f64(),
         })
     }
 
     /// The levels that are worth their time: each has clearly more rays than the one before.
     fn levels(&self) -> Vec<Detail> {
-        let rays = f64::from(self.scene.trace.width.max(self.scene.trace.height));
+        let rays = f64::from(self.settings.scene.trace.width.max(self.settings.scene.trace.height));
         let worth = |detail: &Detail| match detail {
             Detail::Coarse => rays > COARSE_RAYS,
             Detail::Middle => MIDDLE_SHARE * rays > 1.5 * COARSE_RAYS,
@@ -279,7 +286,7 @@ impl Job {
 
     /// The settings of a level.
     fn scene_at(&self, detail: Detail) -> SceneSettings {
-        let mut settings = self.scene.clone();
+        let mut settings = self.settings.scene.clone();
         let trace = &settings.trace;
         let (width, height) = (f64::from(trace.width), f64::from(trace.height));
         let scale = match detail {
@@ -298,8 +305,8 @@ impl Job {
 }
 
 /// The camera from which the scene looks turned about its middle.
-fn turned(camera: &Camera, loaded: &gltf::Loaded, [right, up]: [f64; 2]) -> Camera {
-    let (low, high) = loaded.scene.bounds().unwrap_or_default();
+fn turned(camera: &Camera, scene: &Scene, [right, up]: [f64; 2]) -> Camera {
+    let (low, high) = scene.bounds().unwrap_or_default();
     let middle = 0.5 * (low + high);
     let pose = camera.world_from_camera;
     let [x, y] = [pose.x_axis, pose.y_axis].map(|axis| axis.truncate().normalize_or_zero());
@@ -310,13 +317,13 @@ fn turned(camera: &Camera, loaded: &gltf::Loaded, [right, up]: [f64; 2]) -> Came
 }
 
 /// Moves the points before the panel, and where they are looked for.
-fn shift(lit: &mut Lit, by: DVec3) {
+fn shift(points: &mut ScenePoints, by: DVec3) {
     if by == DVec3::ZERO {
         return;
     }
-    lit.placed.cloud.points.iter_mut().for_each(|point| point.position += by);
-    lit.view.depths.iter_mut().flatten().for_each(|z| *z += by.z);
-    lit.view.focus.iter_mut().for_each(|(_, z)| *z += by.z);
+    points.placed.cloud.points.iter_mut().for_each(|point| point.position += by);
+    points.view.depths.iter_mut().flatten().for_each(|z| *z += by.z);
+    points.view.focus.iter_mut().for_each(|(_, z)| *z += by.z);
 }
 
 #[cfg(test)]

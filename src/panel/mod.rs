@@ -20,6 +20,7 @@ mod profile_file;
 mod profile_text;
 pub mod regional;
 pub mod response;
+mod setup;
 pub mod simulated;
 pub mod vendor;
 pub mod wavefront;
@@ -32,6 +33,7 @@ pub use packing::{Packing, SignalLayout, VideoFrame};
 pub use profile::{CorrectionFile, PanelKind, PanelProfile};
 pub use regional::PixelCurve;
 pub use response::{Curve, PhaseSign, Response};
+pub use setup::{Correction, Setup};
 pub use simulated::{Faults, Residue, Simulation, simulate, simulate_sequence};
 pub use wavefront::Wavefront;
 

@@ -2,9 +2,11 @@
 
 pub mod budget;
 pub mod colour;
+pub mod exposure;
 mod eye;
 #[cfg(test)]
 mod eye_tests;
+mod from_scene;
 pub mod images;
 #[cfg(test)]
 mod odd_tests;
@@ -17,6 +19,8 @@ pub mod view;
 mod wavefront;
 pub mod white;
 
+pub use exposure::{Exposure, Share};
+pub use from_scene::{LitScene, ScenePoints, SceneSettings};
 pub use placement::{Placed, Placement, place};
 pub use subframes::{Multiplexing, SubFrames};
 pub use trace::{TraceSettings, Traced, TracedPoint, trace};

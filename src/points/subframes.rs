@@ -1,6 +1,7 @@
 //! Sub-frames: patterns that are shown faster than an eye sees, so that it sees the mean of their light.
 
 use super::{Channel, PointCloud, PointSource};
+use crate::error::{Error, Result};
 use crate::random::Random;
 
 /// How sub-frames share a cloud's light.
@@ -24,6 +25,20 @@ pub struct SubFrames {
 }
 
 impl SubFrames {
+    /// Most sub-frames: a DMD shows thousands a second, an eye ten pictures.
+    pub const MOST: usize = 256;
+
+    /// So many sub-frames.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for none of them or more than [`SubFrames::MOST`].
+    pub fn new(count: usize, multiplexing: Multiplexing, seed: u64) -> Result<Self> {
+        if !(1..=Self::MOST).contains(&count) {
+            return Err(Error::out_of_range("subframes", count, format!("must be 1 … {}", Self::MOST)));
+        }
+        Ok(Self { count, multiplexing, seed })
+    }
+
     /// The points of one sub-frame, `index` from 0, with random phases.
     pub fn points(&self, cloud: &PointCloud, channel: Channel, index: usize) -> Vec<PointSource> {
         let mut points = cloud.channel(channel);

@@ -188,15 +188,22 @@ fn true_views_on_a_panel_show_the_model_that_points_show_and_do_not_change_with_
     let seen = |segment| of(segment).field(&task, InstructionSet::detect(), &progress).expect("field");
     let (coarse, fine) = (seen(200), seen(50));
     assert!(coarse.work.segments == 6 && fine.work.segments == 96, "{:?} {:?}", coarse.work, fine.work);
-    let settings = crate::pipeline::SceneSettings {
+    let settings = crate::points::SceneSettings {
         placement: Placement::Model { eye: 0.1, z: -0.06, scale: None },
         trace: crate::points::trace::TraceSettings { width: 300, height: 200, ..Default::default() },
         ..Default::default()
     };
-    let lit = crate::pipeline::light(&scene, &settings, &grid, 633e-9, &progress).expect("points");
-    let channel = crate::points::Channel::Luminance;
+    let mut profile = crate::panel::PanelProfile::generic().expect("generic");
+    (profile.width, profile.height) = (grid.width, grid.height);
+    (profile.pitch_x, profile.pitch_y) = (grid.pitch_x, grid.pitch_y);
+    let setup = crate::panel::Setup::new(profile, Some(633e-9)).expect("setup");
+    let lit = crate::pipeline::points(&scene, &settings, &setup, &progress).expect("points");
+    let [exposure] = crate::pipeline::exposures(&setup, &crate::pipeline::Settings::default(), None)[..] else {
+        panic!("one laser, one exposure")
+    };
     let engine = crate::hologram::HologramSettings::default();
-    let plain = crate::pipeline::field(&lit.placed.cloud, channel, &grid, 633e-9, &engine, &progress).expect("field");
+    let plain = crate::pipeline::field(&lit.placed.cloud, &exposure, &setup, &engine, &progress).expect("field");
+    let plain = plain.expect("light");
     // On the plane of the scene's middle, as large as the panel shows it; speckle is averaged over blocks.
     let half = glam::DVec2::new(3.6e-3, 2.4e-3);
     let look = |field: &Field| {

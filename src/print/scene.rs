@@ -130,7 +130,10 @@ impl Task {
                 return Err(Error::input(&self.input, what));
             }
             let source = match plate.wavelengths() {
-                &[a, b, c] => Source::ColorCloud(Lasers::new([a, b, c])?.points(&read.cloud).0),
+                &[a, b, c] => {
+                    let lasers = Lasers::new([a, b, c])?;
+                    Source::ColorCloud([0, 1, 2].map(|index| lasers.points(&read.cloud, index)))
+                }
                 _ => Source::Cloud(read.cloud.channel(Channel::Luminance)),
             };
             let shine = |points: &[PointSource]| points.iter().any(|p| p.amplitude > 0.0);

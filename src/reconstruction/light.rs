@@ -120,9 +120,11 @@ impl Light {
         let channels = channels.map(|channel| channel.unwrap_or_else(|| black.clone()));
         Ok(Reconstruction::Color(ColorPicture::combine(lasers, &channels)))
     }
+}
 
-    /// Writes a picture of a view as .png, sRGB-coded with `white` as white, or linear as .npy.
-    pub fn write(&self, path: &Path, seen: &Reconstruction, white: f32, view: &View, half: DVec2) -> Result<()> {
+impl Reconstruction {
+    /// Writes a picture of a view as .png, sRGB-coded with `white` as white, or linear as .npy; `lasers` are those of a picture in colour.
+    pub fn write(&self, path: &Path, lasers: Option<&Lasers>, white: f32, view: &View, half: DVec2) -> Result<()> {
         let is_npy = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
         let mut described = serde_json::json!({
             "simulated": true,
@@ -130,26 +132,24 @@ impl Light {
             "half": half.to_array(),
             "white": white,
         });
-        if let Some(lasers) = &self.lasers {
+        if let Some(lasers) = lasers {
             described["wavelengths"] = serde_json::json!(lasers.wavelengths());
         }
         described["convention"] = npy::CONVENTION.into();
         let texts = |what: &str| [("Description", what.to_owned()), ("holodrive", described.to_string())];
-        match seen {
-            Reconstruction::Gray(seen) if is_npy => npy::write_intensity(path, seen.width, seen.height, &seen.values),
-            Reconstruction::Color(seen) if is_npy => npy::write_picture(path, seen.width, seen.height, &seen.rgb),
-            Reconstruction::Gray(seen) => {
+        match self {
+            Self::Gray(seen) if is_npy => npy::write_intensity(path, seen.width, seen.height, &seen.values),
+            Self::Color(seen) if is_npy => npy::write_picture(path, seen.width, seen.height, &seen.rgb),
+            Self::Gray(seen) => {
                 seen.write_png(path, Scale::White(white), &texts("simulated reconstruction, sRGB-coded intensity"))
             }
-            Reconstruction::Color(seen) => {
+            Self::Color(seen) => {
                 let texts = texts("simulated reconstruction in the light of three lasers, sRGB");
                 super::write_rgb_png(path, seen.width, seen.height, &seen.rgb, white, &texts)
             }
         }
     }
-}
 
-impl Reconstruction {
     /// Columns and rows.
     pub fn size(&self) -> (usize, usize) {
         match self {

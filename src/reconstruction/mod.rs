@@ -27,6 +27,7 @@
 
 pub mod colour;
 mod flat_field;
+mod gallery;
 mod light;
 pub mod metrics;
 pub mod orders;
@@ -34,6 +35,7 @@ mod picture;
 
 pub use colour::ColorPicture;
 use flat_field::Cone;
+pub use gallery::{Gallery, Shot, Target};
 pub use light::{ExposureLight, Light, Reconstruction};
 pub use orders::{Orders, orders};
 pub use picture::{Picture, Scale, read_gray, write_coded_png, write_rgb_png};

@@ -6,19 +6,19 @@
 //! ([`Animation::first_look`]). The file is read once, its textures are decoded once, and the light on surfaces is
 //! computed again only where a surface or a lamp has moved; where nothing has, the frame before is handed on.
 
-use crate::encode::{EncodeSettings, Encoded};
+use crate::encode::Encoded;
 use crate::error::{Error, Result};
 use crate::field::Grid;
-use crate::hologram::{self, Computed, HologramSettings};
-use crate::illumination::Illumination;
-use crate::panel::PanelProfile;
-use crate::pipeline::{self, Lit, SceneSettings};
-use crate::points::Channel;
+use crate::hologram::{Computed, HologramReport};
+use crate::panel::{Origin, Setup};
+use crate::pipeline::{self, Settings};
 use crate::points::trace::{self, TraceSettings};
-use crate::points::white::{WhitePoint, white_level};
+use crate::points::white::white_level;
+use crate::points::{LitScene, ScenePoints, WhitePoint};
 use crate::progress::Progress;
-use crate::scene::{Camera, Scene, SceneBvh, gltf};
+use crate::scene::{Camera, Scene, gltf};
 use glam::DVec3;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -37,23 +37,23 @@ const DEPTH_MARGIN: f64 = 0.02;
 pub struct Animation {
     /// The scene file.
     pub path: PathBuf,
-    /// How each pose becomes points; its time and what it holds still are set here.
-    pub scene: SceneSettings,
+    /// How each pose becomes a frame; its time and what the sequence keeps fixed are set here.
+    pub settings: Settings,
     /// Time of each frame in the clip [s].
     pub times: Vec<f64>,
 }
 
 /// One frame of an animation.
 #[derive(Clone, Debug)]
-pub struct Made {
+pub struct AnimationFrame {
     /// Running number, from 0.
     pub number: usize,
     /// Its time in the clip [s].
     pub time: f64,
     /// Points and picture.
-    pub lit: Arc<Lit>,
+    pub points: Arc<ScenePoints>,
     /// What the field took.
-    pub field: hologram::HologramReport,
+    pub field: HologramReport,
     /// Levels for the panel.
     pub encoded: Arc<Encoded>,
     /// Whether nothing had moved since the frame before, which this one is again.
@@ -64,6 +64,50 @@ pub struct Made {
     pub seconds: f64,
 }
 
+/// What one frame took.
+#[derive(Clone, Debug, Serialize)]
+pub struct AnimationFrameReport {
+    /// Running number, from 0.
+    pub number: usize,
+    /// Its time in the clip [s].
+    pub time: f64,
+    /// Number of points.
+    pub points: usize,
+    /// Time of the light on surfaces [s]; 0 where it was kept.
+    pub light_seconds: f64,
+    /// Time of the rays [s]; 0 where nothing had moved.
+    pub trace_seconds: f64,
+    /// Time of the field [s]; 0 where nothing had moved.
+    pub field_seconds: f64,
+    /// Time in all [s].
+    pub seconds: f64,
+    /// Whether nothing had moved.
+    pub still: bool,
+    /// Whether the light on surfaces could be kept.
+    pub light_kept: bool,
+    /// Light of the encoded field on the panel: what the brightness of frames is compared by.
+    pub scale: Option<f64>,
+}
+
+impl AnimationFrame {
+    /// What it took.
+    pub fn report(&self) -> AnimationFrameReport {
+        let unless = |kept: bool, seconds: f64| if kept { 0.0 } else { seconds };
+        AnimationFrameReport {
+            number: self.number,
+            time: self.time,
+            points: self.points.placed.cloud.points.len(),
+            light_seconds: unless(self.light_kept, self.points.illumination.seconds),
+            trace_seconds: unless(self.still, self.points.trace.seconds),
+            field_seconds: unless(self.still, self.field.seconds),
+            seconds: self.seconds,
+            still: self.still,
+            light_kept: self.light_kept,
+            scale: self.encoded.frame.metadata.encoding.as_ref().map(|encoding| encoding.scale),
+        }
+    }
+}
+
 impl Animation {
     /// Frames at `rate` [Hz] from `from` to `to` [s], the clip's own first and last key where they are not given. The last
     /// time itself has no frame: played in a loop it is the first one again.
@@ -71,12 +115,12 @@ impl Animation {
     /// # Errors
     /// [`Error::Parameter`] for a file without animation, a rate that is not positive, an interval without extent, or more
     /// than [`MAX_FRAMES`]; as [`gltf::File::open`].
-    pub fn new(path: &Path, scene: &SceneSettings, rate: f64, from: Option<f64>, to: Option<f64>) -> Result<Self> {
+    pub fn new(path: &Path, settings: &Settings, rate: f64, from: Option<f64>, to: Option<f64>) -> Result<Self> {
         let file = gltf::File::open(path)?;
-        let Some([first, last]) = file.clip_times(&scene.load.clip)? else {
+        let Some([first, last]) = file.clip_times(&settings.scene.load.clip)? else {
             return Err(Error::input(
                 path,
-                "has no animation; without --fps, --from and --to it is shown as it stands",
+                "has no animation; without a rate and an interval it is shown as it stands",
             ));
         };
         let (from, to) = (from.unwrap_or(first), to.unwrap_or(last));
@@ -92,13 +136,13 @@ impl Animation {
             return Err(Error::parameter("fps", format!("{count} frames; at most {MAX_FRAMES}")));
         }
         let times = (0..count as usize).map(|n| from + n as f64 / rate).collect();
-        Ok(Self { path: path.to_path_buf(), scene: scene.clone(), times })
+        Ok(Self { path: path.to_path_buf(), settings: settings.clone(), times })
     }
 
     /// Looks at some of the poses and fixes what all frames have in common.
     ///
     /// # Errors
-    /// As [`pipeline::light`].
+    /// As [`pipeline::points`].
     pub fn first_look(&mut self, panel: &Grid, progress: &Progress) -> Result<()> {
         let step = self.times.len().div_ceil(LOOKS).max(1);
         let mut times: Vec<f64> = self.times.iter().copied().step_by(step).collect();
@@ -115,12 +159,12 @@ impl Animation {
             };
             progress.advance(1);
         }
-        self.scene.anchors.bounds = bounds;
-        self.scene.load.framed = bounds;
+        self.settings.scene.anchors.bounds = bounds;
+        self.settings.scene.load.framed = bounds;
         let (mut depths, mut white) = ([f64::INFINITY, f64::NEG_INFINITY], 0.0f32);
         for &time in &times {
             let loaded = self.pose(&mut file, time)?;
-            let (seen, level) = self.glance(&loaded, panel, &progress.part())?;
+            let (seen, level) = self.glance(loaded, panel, &progress.part())?;
             depths = [depths[0].min(seen[0]), depths[1].max(seen[1])];
             white = white.max(level);
             progress.check()?;
@@ -128,33 +172,30 @@ impl Animation {
         }
         if depths[0] <= depths[1] {
             let margin = DEPTH_MARGIN * (depths[1] - depths[0]);
-            self.scene.anchors.depths = Some([(depths[0] - margin).max(0.5 * depths[0]), depths[1] + margin]);
+            self.settings.scene.anchors.depths = Some([(depths[0] - margin).max(0.5 * depths[0]), depths[1] + margin]);
         }
-        if self.scene.white == WhitePoint::Auto && white > 0.0 {
-            self.scene.white = WhitePoint::At(white);
+        if self.settings.scene.white == WhitePoint::Auto && white > 0.0 {
+            self.settings.scene.white = WhitePoint::At(white);
         }
         Ok(())
     }
 
     fn pose(&self, file: &mut gltf::File, time: f64) -> Result<gltf::Loaded> {
-        file.pose(&gltf::LoadOptions { time, ..self.scene.load.clone() })
+        file.pose(&gltf::LoadOptions { time, ..self.settings.scene.load.clone() })
     }
 
     /// Camera distances of the nearest and farthest point [m] and the level of white, by few rays and coarse light.
-    fn glance(&self, loaded: &gltf::Loaded, panel: &Grid, progress: &Progress) -> Result<([f64; 2], f32)> {
-        let settings = &self.scene;
-        let camera = first_camera(&self.path, &loaded.scene)?;
-        let bvh = SceneBvh::new(loaded.scene.clone());
-        let coarse = settings.illumination.coarse();
-        let light = Illumination::new(bvh, coarse, progress)?;
+    fn glance(&self, loaded: gltf::Loaded, panel: &Grid, progress: &Progress) -> Result<([f64; 2], f32)> {
+        let settings = &self.settings.scene;
+        let lit = LitScene::new(&self.path, loaded, settings.illumination.coarse(), progress)?;
         let (width, height) = (f64::from(settings.trace.width), f64::from(settings.trace.height));
         let scale = (LOOK_RAYS / width.max(height)).min(1.0);
         let [w, h] = [width, height].map(|side| (side * scale).round().max(1.0) as u32);
         let rays = TraceSettings { width: w, height: h, edge_rays: 1, ..settings.trace };
         // Where a miniature is seen from is the placement's matter.
-        let placing =
-            settings.placement.prepare_for(&loaded.scene, &settings.anchors, camera, width / height, panel)?;
-        let traced = trace::trace(&light, &placing.camera, &rays, progress)?;
+        let placement = &settings.placement;
+        let placing = placement.prepare_for(lit.scene(), &settings.anchors, lit.camera(), width / height, panel)?;
+        let traced = trace::trace(lit.illumination(), &placing.camera, &rays, progress)?;
         let camera_from_world = placing.camera.world_from_camera.inverse();
         let ends = traced
             .points
@@ -170,78 +211,81 @@ impl Animation {
     /// As the steps of [`pipeline`]; those of `take`.
     pub fn make(
         &self,
-        (profile, wavelength, channel): (&PanelProfile, f64, Channel),
-        hologram: &HologramSettings,
-        encode: &EncodeSettings,
+        setup: &Setup,
         progress: &Progress,
-        take: &mut dyn FnMut(Made) -> Result<bool>,
+        take: &mut dyn FnMut(AnimationFrame) -> Result<bool>,
     ) -> Result<()> {
-        let grid = profile.grid()?;
         let mut file = gltf::File::open(&self.path)?;
-        let mut number = 0;
-        let mut pending: Option<gltf::Loaded> = None;
-        while let Some(&time) = self.times.get(number) {
-            let mut begin = Instant::now();
+        // The pose whose light was computed, its camera, and the last frame that it gave.
+        let mut kept: Option<(LitScene, Camera, AnimationFrame)> = None;
+        for (number, &time) in self.times.iter().enumerate() {
+            let begin = Instant::now();
             progress.start("scene", 0);
-            let loaded = match pending.take() {
-                Some(loaded) => loaded,
-                None => self.pose(&mut file, time)?,
+            let pose = self.pose(&mut file, time)?;
+            let seen_from = first_camera(&self.path, &pose.scene)?.clone();
+            let before = kept.take().filter(|(lit, ..)| same_light(&pose.scene, lit.scene()));
+            let light_kept = before.is_some();
+            let (lit, frame) = match before {
+                Some((lit, camera, frame)) if camera == seen_from => {
+                    (lit, AnimationFrame { number, time, still: true, light_kept, ..frame })
+                }
+                before => {
+                    let lit = match before {
+                        Some((lit, ..)) => lit,
+                        None => LitScene::new(&self.path, pose, self.settings.scene.illumination, progress)?,
+                    };
+                    let frame = self.frame(number, &lit, &seen_from, setup, progress)?;
+                    (lit, AnimationFrame { light_kept, ..frame })
+                }
             };
-            let bvh = SceneBvh::new(loaded.scene.clone());
-            let light = Illumination::new(bvh, self.scene.illumination, progress)?;
-            let mut camera = first_camera(&self.path, &loaded.scene)?.clone();
-            let mut last: Option<Made> = None;
-            // All frames for which this light holds.
-            while let Some(&time) = self.times.get(number) {
-                if last.is_some() {
-                    begin = Instant::now();
-                    let next = self.pose(&mut file, time)?;
-                    if !same_light(&next.scene, &loaded.scene) {
-                        pending = Some(next);
-                        break;
-                    }
-                    let seen_from = first_camera(&self.path, &next.scene)?;
-                    if *seen_from == camera
-                        && let Some(made) = &last
-                    {
-                        let again = Made { number, time, still: true, light_kept: true, ..made.clone() };
-                        let again = Made { seconds: begin.elapsed().as_secs_f64(), ..again };
-                        number += 1;
-                        if !take(again)? {
-                            return Ok(());
-                        }
-                        continue;
-                    }
-                    camera = seen_from.clone();
-                }
-                let (at, settings) = ((&grid, wavelength), &self.scene);
-                let lit = pipeline::seen(&self.path, (&loaded, &camera), &light, settings, at, progress)?;
-                let Computed { field, report } =
-                    pipeline::field(&lit.placed.cloud, channel, &grid, wavelength, hologram, progress)?;
-                let mut encoded = pipeline::frame(&field, profile, encode, progress)?;
-                let origin = &mut encoded.frame.metadata.origin;
-                origin.source = Some(self.path.display().to_string());
-                origin.points = Some(lit.placed.cloud.points.len());
-                origin.depth = lit.placed.cloud.depth_range().map(|(far, near)| [near, far]);
-                origin.notes = vec![format!("frame {number} of {}, at {time:.6} s", self.times.len())];
-                let made = Made {
-                    number,
-                    time,
-                    lit: Arc::new(lit),
-                    field: report,
-                    encoded: Arc::new(encoded),
-                    still: false,
-                    light_kept: last.is_some(),
-                    seconds: begin.elapsed().as_secs_f64(),
-                };
-                last = Some(made.clone());
-                number += 1;
-                if !take(made)? {
-                    return Ok(());
-                }
+            let frame = AnimationFrame { seconds: begin.elapsed().as_secs_f64(), ..frame };
+            if !take(frame.clone())? {
+                return Ok(());
             }
+            kept = Some((lit, seen_from, frame));
         }
         Ok(())
+    }
+
+    /// A frame of its own for a pose.
+    fn frame(
+        &self,
+        number: usize,
+        lit: &LitScene,
+        camera: &Camera,
+        setup: &Setup,
+        progress: &Progress,
+    ) -> Result<AnimationFrame> {
+        let (settings, time) = (&self.settings, self.times[number]);
+        let points = lit.points(camera, &settings.scene, &setup.grid, setup.wavelength, progress)?;
+        let cloud = &points.placed.cloud;
+        let exposures = pipeline::exposures(setup, settings, None);
+        let [exposure] = exposures.as_slice() else {
+            return Err(Error::parameter("exposures", "an animation has one for each of its frames"));
+        };
+        let computed = pipeline::field(cloud, exposure, setup, &settings.hologram, progress)?;
+        let Some(Computed { field, report }) = computed else {
+            return Err(Error::input(&self.path, "has no light for the laser"));
+        };
+        let origin = Origin {
+            source: Some(self.path.display().to_string()),
+            points: Some(cloud.points.len()),
+            depth: points.content().depth,
+            notes: vec![format!("frame {number} of {}, at {time:.6} s", self.times.len())],
+            ..Origin::default()
+        };
+        let encoded = Arc::new(pipeline::frame(&field, setup, &settings.encode, origin, progress)?);
+        let points = Arc::new(points);
+        Ok(AnimationFrame {
+            number,
+            time,
+            points,
+            field: report,
+            encoded,
+            still: false,
+            light_kept: false,
+            seconds: 0.0,
+        })
     }
 }
 

@@ -8,7 +8,7 @@ pub mod canvas;
 pub mod contact;
 pub mod prepared;
 
-pub use animated::{Animation, Made};
+pub use animated::{Animation, AnimationFrame, AnimationFrameReport};
 pub use canvas::Canvas;
 pub use contact::ContactSheet;
 pub use prepared::{Prepared, RawFormat, Shown, Source};

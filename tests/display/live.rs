@@ -8,6 +8,7 @@ use crate::{Case, Ended};
 use glam::DVec3;
 use holodrive::live::{Look, PICTURE, reconstruct};
 use holodrive::panel::Frame;
+use holodrive::pipeline::Bench;
 use holodrive::points::Placement;
 use holodrive::points::placement::Placing;
 use holodrive::progress::Progress;
@@ -193,10 +194,11 @@ fn operator(desk: &Desk) -> Ended {
             focus: event["focus"].as_f64().expect("focus"),
             eye: event["eye"].as_array().map(|eye| [0, 1].map(|i: usize| eye[i].as_f64().expect("place"))),
             pupil: 4e-3,
-            zero_order_stop: 0.05f64.to_radians(),
         };
+        let bench = Bench { zero_order_stop: 0.05f64.to_radians(), ..Bench::default() };
         let size = [0, 1].map(|i: usize| event["size"][i].as_u64().expect("size") as usize);
-        let picture = reconstruct(&frame, &placing(&frame), &look, (size[0], size[1]), &Progress::new()).expect("seen");
+        let picture =
+            reconstruct(&frame, &placing(&frame), &look, (size[0], size[1]), &bench, &Progress::new()).expect("seen");
         let coded = picture.coded(Scale::Percentile(0.995));
         let wanted: Vec<u8> = coded.iter().map(|level| (level * 255.0).round() as u8).collect();
         // The window's corner stands 40 pixels from the monitor's, where no window manager moves it.

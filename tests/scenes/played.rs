@@ -1,17 +1,14 @@
 //! Animated scenes as sequences of holograms: they move, upright and unmirrored, and what stands still stands still.
 
-use holodrive::encode::{EncodeSettings, Encoding};
 use holodrive::hologram::HologramSettings;
-use holodrive::names::Named;
-use holodrive::panel::simulated::Simulation;
-use holodrive::panel::{Packing, PanelProfile, SignalLayout};
-use holodrive::pipeline::{self, SceneSettings};
-use holodrive::points::Channel;
+use holodrive::panel::{Packing, PanelProfile, Setup, SignalLayout};
+use holodrive::pipeline::{self, Bench, Settings};
 use holodrive::points::trace::TraceSettings;
+use holodrive::points::{Channel, SceneSettings};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::{self, View};
 use holodrive::scene::gltf::{Choice, Clip, File, LoadOptions};
-use holodrive::sequence::{Animation, Made};
+use holodrive::sequence::{Animation, AnimationFrame};
 use std::path::PathBuf;
 
 fn scene(name: &str) -> PathBuf {
@@ -26,24 +23,21 @@ fn panel() -> PanelProfile {
     profile
 }
 
-fn settings(clip: &str) -> SceneSettings {
+fn settings(clip: &str) -> Settings {
     let load = LoadOptions { clip: Clip::Of(Choice::from(clip)), ..LoadOptions::default() };
     let trace = TraceSettings { width: 72, height: 60, ..TraceSettings::default() };
-    SceneSettings { load, trace, ..SceneSettings::default() }
+    let hologram = HologramSettings { error: 1e-2, ..HologramSettings::default() };
+    Settings { scene: SceneSettings { load, trace, ..SceneSettings::default() }, hologram, ..Settings::default() }
 }
 
-fn made(animation: &Animation) -> Vec<Made> {
-    let (profile, progress) = (panel(), Progress::new());
-    let at = (&profile, profile.default_wavelength(), Channel::Luminance);
-    let encode = EncodeSettings::new(Encoding::named("double-phase").expect("encoding"));
+fn made(animation: &Animation) -> Vec<AnimationFrame> {
     let mut all = Vec::new();
-    let hologram = HologramSettings { error: 1e-2, ..HologramSettings::default() };
-    animation
-        .make(at, &hologram, &encode, &progress, &mut |made| {
-            all.push(made);
-            Ok(true)
-        })
-        .expect("frames");
+    let setup = Setup::new(panel(), None).expect("setup");
+    let mut take = |made| {
+        all.push(made);
+        Ok(true)
+    };
+    animation.make(&setup, &Progress::new(), &mut take).expect("frames");
     all
 }
 
@@ -70,18 +64,18 @@ fn the_letter_of_each_frame_is_seen_where_it_is_at_that_time() {
     let upper = |values: &[f32]| values[..width * height / 2].to_vec();
     let traced: Vec<Vec<f32>> = frames
         .iter()
-        .map(|made| upper(&made.lit.view.picture.iter().map(|rgb| Channel::Luminance.of(*rgb)).collect::<Vec<_>>()))
+        .map(|made| upper(&made.points.view.picture.iter().map(|rgb| Channel::Luminance.of(*rgb)).collect::<Vec<_>>()))
         .collect();
-    let focus: Vec<f64> = frames.iter().map(|made| made.lit.view.focus[0].1).collect();
+    let focus: Vec<f64> = frames.iter().map(|made| made.points.view.focus[0].1).collect();
     for (made, z) in frames.iter().zip(&focus) {
         // It stands still in depth: 2.0 m is the nearest depth of all frames but for the margin of the first look.
         assert!((z - focus[0]).abs() < 1e-9 && (-0.105..-0.1).contains(z), "{focus:?}");
-        let (field, view) =
-            pipeline::simulated_light(&made.encoded.frame, &Simulation::default(), &Progress::new()).expect("light");
+        let light = pipeline::light(&made.encoded.frame, &Bench::default(), &Progress::new()).expect("light");
         let seen = |z: f64| {
-            let half = made.lit.view.placing.view_at(z);
-            let view_at = View::Plane { z };
-            reconstruction::picture(&field, &view_at, half, (width, height), &view, &Progress::new()).expect("picture")
+            let half = made.points.view.placing.view_at(z);
+            let (view, settings) = (View::Plane { z }, &light.settings);
+            reconstruction::picture(&light.field, &view, half, (width, height), settings, &Progress::new())
+                .expect("picture")
         };
         let sharp = upper(&seen(*z).values);
         let own = likeness(&sharp, &traced[made.number]);
@@ -124,12 +118,12 @@ fn what_is_held_is_the_same_for_all_frames_of_a_file_without_a_camera() {
     let mut animation = Animation::new(&path, &settings("motion"), 2.0, None, None).expect("animation");
     animation.first_look(&panel().grid().expect("grid"), &Progress::new()).expect("first look");
     let frames = made(&animation);
-    let cameras: Vec<_> = frames.iter().map(|made| made.lit.view.placing.camera.clone()).collect();
+    let cameras: Vec<_> = frames.iter().map(|made| made.points.view.placing.camera.clone()).collect();
     assert!(cameras.windows(2).all(|pair| pair[0] == pair[1]));
     // The clip's first and third pose: the plate's left lower corner stands still but for its own growth, and the mast's foot
     // is where it was.
-    let lowest = |made: &Made| {
-        let points = &made.lit.placed.cloud.points;
+    let lowest = |made: &AnimationFrame| {
+        let points = &made.points.placed.cloud.points;
         points.iter().map(|p| p.position).min_by(|a, b| a.y.total_cmp(&b.y)).expect("points")
     };
     assert!(lowest(&frames[0]).distance(lowest(&frames[1])) < 2e-4, "{} {}", lowest(&frames[0]), lowest(&frames[1]));
@@ -138,7 +132,7 @@ fn what_is_held_is_the_same_for_all_frames_of_a_file_without_a_camera() {
 #[test]
 fn what_cannot_be_played_is_told() {
     let new = |name: &str, fps: f64, from: Option<f64>, to: Option<f64>| {
-        let told = Animation::new(&scene(name), &SceneSettings::default(), fps, from, to).err().map(|e| e.to_string());
+        let told = Animation::new(&scene(name), &Settings::default(), fps, from, to).err().map(|e| e.to_string());
         told.unwrap_or_default()
     };
     assert!(new("cornell.gltf", 12.0, None, None).contains("has no animation"));

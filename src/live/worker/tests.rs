@@ -1,6 +1,6 @@
 use super::*;
 use crate::names::Named;
-use crate::panel::{Packing, SignalLayout};
+use crate::panel::{Packing, PanelProfile, SignalLayout};
 use std::time::Duration;
 
 /// Longer than any step takes on a busy machine.
@@ -13,18 +13,19 @@ fn panel() -> PanelProfile {
     profile
 }
 
-fn wish() -> Wish {
-    let encode = EncodeSettings::new(Encoding::named("double-phase").expect("encoding"));
-    Wish { turn: [0.0; 2], shift: DVec3::ZERO, wavelength: 632.8e-9, encode }
+fn request() -> Request {
+    let encode =
+        EncodeOptions { encoding: Some(Encoding::named("double-phase").expect("encoding")), ..Default::default() };
+    Request { turn: [0.0; 2], shift: DVec3::ZERO, wavelength: 632.8e-9, encode }
 }
 
 fn start(path: &Path, rays: u32) -> (Worker, Vec<PathBuf>) {
     let trace = TraceSettings { width: rays, height: rays, ..TraceSettings::default() };
-    let scene = SceneSettings { trace, ..SceneSettings::default() };
-    Worker::start(path, scene, (panel(), Channel::Luminance), HologramSettings::default(), wish()).expect("starts")
+    let settings = Settings { scene: SceneSettings { trace, ..SceneSettings::default() }, ..Settings::default() };
+    Worker::start(path, Setup::new(panel(), None).expect("setup"), settings, request()).expect("starts")
 }
 
-fn next(worker: &Worker) -> Happened {
+fn next(worker: &Worker) -> WorkerEvent {
     let begin = Instant::now();
     loop {
         if let Some(happened) = worker.poll().expect("the worker lives") {
@@ -35,12 +36,12 @@ fn next(worker: &Worker) -> Happened {
     }
 }
 
-/// Waits for that level of that wish.
-fn refined(worker: &Worker, version: u64, detail: Detail) -> Refined {
+/// Waits for that level of that request.
+fn refined(worker: &Worker, version: u64, detail: Detail) -> LiveHologram {
     loop {
         match next(worker) {
-            Happened::Refined(refined) if (refined.version, refined.detail) == (version, detail) => return *refined,
-            Happened::Failed(why) => panic!("{why}"),
+            WorkerEvent::Ready(refined) if (refined.version, refined.detail) == (version, detail) => return *refined,
+            WorkerEvent::Failed(why) => panic!("{why}"),
             _ => {}
         }
     }
@@ -50,8 +51,8 @@ fn own(name: &str) -> String {
     std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)).expect("scene")
 }
 
-fn middle(refined: &Refined) -> DVec3 {
-    let points = &refined.lit.placed.cloud.points;
+fn middle(refined: &LiveHologram) -> DVec3 {
+    let points = &refined.points.placed.cloud.points;
     points.iter().map(|point| point.position).sum::<DVec3>() / points.len() as f64
 }
 
@@ -64,75 +65,75 @@ fn levels_come_in_their_order_and_a_broken_file_leaves_the_last_good_scene() {
     assert_eq!(files, std::slice::from_ref(&path));
     // Half of 96 rays would be fewer than the coarse level's 56: there is no level between.
     let come = || match next(&worker) {
-        Happened::Refined(refined) => *refined,
+        WorkerEvent::Ready(refined) => *refined,
         other => panic!("{other:?}"),
     };
     let [coarse, fine] = [come(), come()];
     assert_eq!([coarse.detail, fine.detail], [Detail::Coarse, Detail::Full]);
-    assert!(2 * coarse.lit.placed.cloud.points.len() < fine.lit.placed.cloud.points.len());
+    assert!(2 * coarse.points.placed.cloud.points.len() < fine.points.placed.cloud.points.len());
     assert!(coarse.seconds < fine.seconds);
-    // The scene breaks: one line; the wish is answered from the scene that is known.
+    // The scene breaks: one line; the request is answered from the scene that is known.
     std::fs::write(&path, "{").expect("write");
-    let version = worker.wish(wish(), true);
-    let Happened::Failed(why) = next(&worker) else { panic!("a broken file was not told") };
+    let version = worker.request(request(), true);
+    let WorkerEvent::Failed(why) = next(&worker) else { panic!("a broken file was not told") };
     assert!(why.contains("scene.gltf") && !why.contains('\n'), "{why}");
     assert_eq!(refined(&worker, version, Detail::Full).frame, fine.frame);
     // It is mended, with the letter elsewhere.
     std::fs::write(&path, own("motion.gltf").replace("-0.55, 0.5, -2.0", "0.0, 0.5, -2.0")).expect("write");
-    let version = worker.wish(Wish { shift: DVec3::new(0.0, 0.0, 1e-3), ..wish() }, true);
-    let Happened::Loaded(files) = next(&worker) else { panic!("the file was not read again") };
+    let version = worker.request(Request { shift: DVec3::new(0.0, 0.0, 1e-3), ..request() }, true);
+    let WorkerEvent::Loaded(files) = next(&worker) else { panic!("the file was not read again") };
     assert_eq!(files, [path]);
     let other = refined(&worker, version, Detail::Full);
     assert!(other.frame != fine.frame);
 }
 
 #[test]
-fn a_wish_moves_the_hologram_as_it_says() {
+fn a_request_moves_the_hologram_as_it_says() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/motion.gltf");
     let (worker, _) = start(&path, 48);
     let at_rest = middle(&refined(&worker, 1, Detail::Full));
     let by = DVec3::new(2e-4, -1e-4, 5e-3);
-    let version = worker.wish(Wish { shift: by, ..wish() }, false);
+    let version = worker.request(Request { shift: by, ..request() }, false);
     let moved = refined(&worker, version, Detail::Full);
     assert!((middle(&moved) - at_rest - by).length() < 1e-9);
-    assert!((moved.lit.view.focus[0].1 - (-0.1 + 5e-3)).abs() < 2e-3);
+    assert!((moved.points.view.focus[0].1 - (-0.1 + 5e-3)).abs() < 2e-3);
     // Turned to the right, what stood near before the middle goes to the right: the letter, which is nearest.
-    let letter = |refined: &Refined| {
-        let points: Vec<DVec3> = refined.lit.placed.cloud.points.iter().map(|p| p.position).collect();
+    let letter = |refined: &LiveHologram| {
+        let points: Vec<DVec3> = refined.points.placed.cloud.points.iter().map(|p| p.position).collect();
         let upper: Vec<&DVec3> = points.iter().filter(|p| p.y > 0.3e-3).collect();
         upper.iter().map(|p| p.x).sum::<f64>() / upper.len() as f64
     };
-    let version = worker.wish(Wish { turn: [0.3, 0.0], ..wish() }, false);
+    let version = worker.request(Request { turn: [0.3, 0.0], ..request() }, false);
     let turned = refined(&worker, version, Detail::Full);
-    let version = worker.wish(wish(), false);
+    let version = worker.request(request(), false);
     let back = refined(&worker, version, Detail::Full);
     assert!(letter(&turned) > letter(&back) + 1e-4, "{} {}", letter(&turned), letter(&back));
     assert!((middle(&back) - at_rest).length() < 1e-12);
     // Another wavelength and encoding are in the frame's own words.
-    let encode = EncodeSettings::new(Encoding::named("kinoform").expect("encoding"));
-    let version = worker.wish(Wish { wavelength: 520e-9, encode, ..wish() }, false);
+    let encode = EncodeOptions { encoding: Some(Encoding::named("kinoform").expect("encoding")), ..Default::default() };
+    let version = worker.request(Request { wavelength: 520e-9, encode, ..request() }, false);
     let frame = refined(&worker, version, Detail::Full).frame;
     assert_eq!(frame.metadata.wavelength, 520e-9);
     assert_eq!(frame.metadata.encoding.expect("encoding").method, "kinoform");
 }
 
 #[test]
-fn a_new_wish_stops_what_is_running() {
+fn a_new_request_stops_what_is_running() {
     // A room with indirect light and a mirror takes seconds at this size.
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.gltf");
     let (worker, _) = start(&path, 700);
     refined(&worker, 1, Detail::Coarse);
     // While the second level is computed.
     std::thread::sleep(Duration::from_millis(100));
-    let version = worker.wish(Wish { shift: DVec3::new(0.0, 0.0, 1e-3), ..wish() }, false);
+    let version = worker.request(Request { shift: DVec3::new(0.0, 0.0, 1e-3), ..request() }, false);
     let stopped = loop {
         match next(&worker) {
-            Happened::Cancelled(after) => break after,
-            Happened::Refined(refined) => assert!(refined.version < version, "nothing was stopped"),
+            WorkerEvent::Cancelled(after) => break after,
+            WorkerEvent::Ready(refined) => assert!(refined.version < version, "nothing was stopped"),
             other => panic!("{other:?}"),
         }
     };
-    println!("stopped {:.1} ms after the wish", 1e3 * stopped);
+    println!("stopped {:.1} ms after the request", 1e3 * stopped);
     // The bound is 50 ms on a machine of one's own; this one may be busy.
     assert!(stopped < 0.5, "stopped only after {stopped} s");
     refined(&worker, version, Detail::Coarse);

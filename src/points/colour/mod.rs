@@ -125,31 +125,37 @@ impl Lasers {
         (self.rgb_from_drive * DVec3::from_array(drive.map(f64::from))).as_vec3().to_array()
     }
 
-    /// The points of a cloud for each laser, in the cloud's order, and what the gamut did; a colourless cloud is white.
+    /// The points of a cloud as laser `index` (0 red to 2 blue) shows them, in the cloud's order; a colourless cloud is
+    /// white.
     ///
-    /// With amplitudes √radiance·distance for red, green and blue, each laser's is √drive·distance.
-    pub fn points(&self, cloud: &PointCloud) -> ([Vec<PointSource>; 3], Gamut) {
-        let mut each = [cloud.points.clone(), cloud.points.clone(), cloud.points.clone()];
+    /// With amplitudes √radiance·distance for red, green and blue, the laser's is √drive·distance.
+    pub fn points(&self, cloud: &PointCloud, index: usize) -> Vec<PointSource> {
+        let mut points = cloud.points.clone();
+        for (point, amplitudes) in points.iter_mut().zip(cloud.rgb.iter().flatten()) {
+            point.amplitude = self.drive(amplitudes.map(|a| a * a)).values[index].sqrt();
+        }
+        points
+    }
+
+    /// What the lasers' gamut does to a cloud.
+    pub fn gamut(&self, cloud: &PointCloud) -> Gamut {
         let mut gamut = Gamut { least_kept: 1.0, ..Gamut::default() };
-        let Some(rgb) = &cloud.rgb else { return (each, gamut) };
+        let Some(rgb) = &cloud.rgb else { return gamut };
         let (mut all, mut outside) = (0.0, 0.0);
-        for (index, amplitudes) in rgb.iter().enumerate() {
+        for amplitudes in rgb {
             let color = amplitudes.map(|a| a * a);
-            let drive = self.drive(color);
-            for (points, value) in each.iter_mut().zip(drive.values) {
-                points[index].amplitude = value.sqrt();
-            }
             let light = f64::from(luminance(color));
             all += light;
-            if drive.kept < 1.0 {
+            let kept = self.drive(color).kept;
+            if kept < 1.0 {
                 gamut.outside_points += 1;
                 outside += light;
-                gamut.least_kept = gamut.least_kept.min(f64::from(drive.kept));
+                gamut.least_kept = gamut.least_kept.min(f64::from(kept));
             }
         }
         gamut.outside_share = gamut.outside_points as f64 / rgb.len().max(1) as f64;
         gamut.outside_light = if all > 0.0 { outside / all } else { 0.0 };
-        (each, gamut)
+        gamut
     }
 }
 
@@ -247,7 +253,8 @@ mod tests {
         let cloud = PointCloud { points: vec![at(-0.1), at(-0.2), at(-0.3)], rgb: Some(rgb) };
         let lasers = Lasers::new([520.0 * NM, 450.0 * NM, 638.0 * NM]).expect("lasers");
         assert!((lasers.wavelengths()[0] - 638e-9).abs() < 1e-15, "sorted by falling wavelength");
-        let (each, gamut) = lasers.points(&cloud);
+        let each = [0, 1, 2].map(|index| lasers.points(&cloud, index));
+        let gamut = lasers.gamut(&cloud);
         assert!(each.iter().all(|points| (points[0].amplitude - 2.0).abs() < 1e-5), "white is white in each");
         assert!(each[0][2].amplitude > 5.0 * each[2][2].amplitude, "red is the red laser's");
         assert!(each[2][1].amplitude > 3.0 * each[1][1].amplitude, "blue is the blue laser's");
@@ -255,8 +262,8 @@ mod tests {
         assert_eq!(gamut.outside_points, 1);
         assert!((gamut.outside_light - 0.0722 / (4.0 + 0.0722 + 0.2126)).abs() < 1e-6, "{gamut:?}");
         let plain = PointCloud { rgb: None, ..cloud };
-        let (each, gamut) = lasers.points(&plain);
-        assert!(each.iter().all(|points| *points == plain.points) && gamut.outside_points == 0);
+        let each = [0, 1, 2].map(|index| lasers.points(&plain, index));
+        assert!(each.iter().all(|points| *points == plain.points) && lasers.gamut(&plain).outside_points == 0);
     }
 
     #[test]

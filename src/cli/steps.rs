@@ -1,0 +1,123 @@
+//! The steps from a scene to a field, one by one.
+
+use super::args::{ComputeArgs, PointsArgs, PropagateArgs, White};
+use super::bar::Bar;
+use super::holograms::Maker;
+use super::layers;
+use super::light::report_gamut;
+use super::load::{Input, Points, input};
+use super::report::{Report, seconds};
+use super::resolve;
+use holodrive::field::npy;
+use holodrive::panel::PanelProfile;
+use holodrive::pipeline::Settings;
+use holodrive::points::{Placement, ScenePoints, images, ply};
+use holodrive::propagation::{self, Propagator};
+use holodrive::reconstruction::write_rgb_png;
+use holodrive::units::show_length;
+use holodrive::{Error, Result};
+use std::path::Path;
+use std::time::Instant;
+
+pub(super) fn points(args: &PointsArgs) -> Result<Report> {
+    let mut report = Report::new("points");
+    let setup = resolve::setup_in_color(&args.panel, &args.color, &mut report)?;
+    let source = input(&args.scene)?;
+    let no_scene = || Error::input(&args.scene, "is no scene: .gltf or .glb");
+    if !matches!(source, Input::Scene(_)) {
+        return Err(no_scene());
+    }
+    let bar = Bar::new();
+    let settings = resolve::scene(&args.light, &args.placement, White::None);
+    let scale = args.placement.depth_scale;
+    let points = Points::load(&source, &settings, scale, &setup, &bar.progress, &mut report)?;
+    if let Some(lasers) = &setup.lasers {
+        report_gamut(lasers, &lasers.gamut(&points.cloud), &mut report);
+    }
+    let (mut cloud, mut metadata) = (points.cloud, points.metadata);
+    let scene = points.scene.ok_or_else(no_scene)?;
+    if args.frame == ply::Frame::World {
+        metadata = ply::Metadata { frame: ply::Frame::World, eye: None, window: None, ..metadata };
+        for (point, world) in cloud.points.iter_mut().zip(&scene.world) {
+            point.position = world.position;
+        }
+    }
+    bar.progress.check()?;
+    if let Some(picture) = &args.picture {
+        write_traced(picture, &scene)?;
+        report.file("picture", "picture", picture);
+    }
+    if let Some(map) = &args.depth_map {
+        let Placement::Window { near, far, .. } = settings.placement else {
+            let what = "is for --placement window, whose --near and --far it runs between";
+            return Err(Error::parameter("depth-map", what));
+        };
+        let size = [scene.view.width as u32, scene.view.height as u32];
+        images::write_depths(map, size, &scene.view.depths, scale, [near, far])?;
+        report.file("depth_map", "depth map", map);
+    }
+    ply::write(&args.output, &cloud, &metadata)?;
+    report.output("points", &args.output);
+    Ok(report)
+}
+
+/// The traced picture: linear as .npy, shown as .png.
+pub(super) fn write_traced(path: &Path, scene: &ScenePoints) -> Result<()> {
+    let view = &scene.view;
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+        let texts = [("Description", "traced picture, sRGB-coded linear radiance".to_string())];
+        write_rgb_png(path, view.width, view.height, &view.picture, scene.white.white, &texts)
+    } else {
+        npy::write_picture(path, view.width, view.height, &view.picture)
+    }
+}
+
+pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
+    let mut report = Report::new("compute");
+    let setup = resolve::setup_in_color(&args.panel, &args.color, &mut report)?;
+    let bar = Bar::new();
+    let source = input(&args.input)?;
+    if args.layers.is_some() || matches!(source, Input::Stack(_)) {
+        layers::compute(args, &source, &setup, &bar.progress, &mut report)?;
+        return Ok(report);
+    }
+    if let Some(segment) = args.views {
+        super::true_views::compute(args, (&source, segment), &setup, &bar.progress, &mut report)?;
+        return Ok(report);
+    }
+    let settings = Settings {
+        scene: resolve::scene(&args.light, &args.placement, White::Auto),
+        channel: args.hologram.channel,
+        hologram: resolve::hologram(&args.hologram),
+        ..Settings::default()
+    };
+    let scale = args.placement.depth_scale;
+    let points = Points::load(&source, &settings.scene, scale, &setup, &bar.progress, &mut report)?;
+    let maker = Maker { input: &args.input, setup: &setup, settings: &settings, progress: &bar.progress };
+    maker.fields(&points, &args.output, &mut report)?;
+    Ok(report)
+}
+
+pub(super) fn propagate(args: &PropagateArgs) -> Result<Report> {
+    let mut report = Report::new("propagate");
+    let profile = args.panel.as_deref().map(PanelProfile::find).transpose()?;
+    let pitch = args.pitch.or(profile.as_ref().map(|p| [p.pitch_x, p.pitch_y]));
+    let wavelength = args.wavelength.or(profile.as_ref().map(PanelProfile::default_wavelength));
+    let (field, metadata) = npy::read_field(&args.input, pitch, wavelength)?;
+    let bar = Bar::new();
+    let begin = Instant::now();
+    bar.progress.start("propagate", 0);
+    let settings = propagation::Settings { kernel: args.kernel, ..propagation::Settings::default() };
+    let planned = Propagator::new(field.grid, field.grid, settings)?;
+    let out = planned.propagate(&field, args.distance, &bar.progress)?;
+    let content = npy::Content { z: metadata.content.z + args.distance, ..metadata.content };
+    npy::write_field(&args.output, &out, &content, &metadata.origin)?;
+    let elapsed = begin.elapsed().as_secs_f64();
+    report.add("distance", args.distance, "");
+    report.add("wavelength", field.wavelength, "");
+    report.add("memory", planned.memory(), "");
+    report.add("energy_kept", out.energy() / field.energy(), "");
+    report.add("seconds", elapsed, format!("propagated over {} in {}", show_length(args.distance), seconds(elapsed)));
+    report.output("field", &args.output);
+    Ok(report)
+}
