@@ -320,6 +320,11 @@ fn a_depth_on_the_other_side_than_the_content_is_told_with_both_numbers() {
     // The old name of --engine, for one release.
     assert_eq!(same, said(&["compute", "p.ply", "--panel", "small.toml", "--method", "direct", "-o", "other.npy"]));
     said(&["encode", "field.npy", "--panel", "small.toml", "--method", "double-phase", "-o", "frame.png"]);
+    // A flag that this input has no use for is named.
+    let idle =
+        said(&["compute", "p.ply", "--panel", "small.toml", "--rays", "9x9", "--near", "-1m", "-o", "other.npy"]);
+    assert!(idle.contains("--rays, --near: of no use for a point cloud; ignored"), "{idle}");
+    refused(f, &["show", "frame.png", "--hold", "3"], "--monitor");
     for input in ["field.npy", "frame.png"] {
         assert_eq!(said(&["reconstruct", input, "--distance", "-30mm"]), "");
         for flags in [&["--distance", "30mm"][..], &["--eye", "0mm,0mm,600mm", "--focus", "30mm"]] {

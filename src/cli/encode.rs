@@ -21,6 +21,7 @@ use std::time::Instant;
 
 pub(super) fn encode(args: &EncodeArgs) -> Result<Report> {
     let mut report = Report::new("encode");
+    report.warn(&args.idle);
     let setup = resolve::setup(&args.panel, &mut report)?;
     let setup = Setup { correction: resolve::correction(args.encoding.correction.as_deref())?, ..setup };
     let bar = Bar::new();
@@ -76,7 +77,7 @@ fn encode_picture(args: &EncodeArgs, setup: &Setup, progress: &Progress, report:
         None => PlaneStart::Random { seed: 1 },
     };
     let own = PlaneEncoding { start, ..given.clone() };
-    let planes = read_picture(&rgb, map.as_deref(), &own.depths)?.planes(&setup.grid, args.window)?;
+    let planes = read_picture(&rgb, map.as_deref(), &own.depths)?.planes(&setup.grid, args.picture.window)?;
     let kept: Vec<f64> = planes.iter().map(|plane| plane.z).collect();
     let beside = (settings.correction.as_ref(), settings.illumination);
     let (mut made, found) = encode_planes(planes, setup.wavelength, &setup.profile, &own, beside, progress)?;

@@ -29,7 +29,7 @@ pub(super) fn compute(
     let placement = resolve::placement(&args.placement);
     let slices = match (input, args.layers) {
         (Input::Images(rgb, depth), Some(count)) => {
-            let picture = RgbDepth::read(rgb, depth, args.placement.depth_scale, &placement)?;
+            let picture = RgbDepth::read(rgb, depth, args.map.depth_scale, &placement)?;
             let window = Window::new(&placement, picture.size(), &setup.grid)?;
             Slices::of_depth(picture, window, &setup.grid, count)?
         }
@@ -41,7 +41,7 @@ pub(super) fn compute(
     };
     let seed = match args.placement.phase {
         Phase::Zero => None,
-        Phase::Random { .. } => Some(args.light.seed),
+        Phase::Random { .. } => Some(args.light.random.seed),
         Phase::Path => {
             return Err(Error::parameter("phase", "path is for scenes; use zero or random with a picture"));
         }

@@ -1,39 +1,43 @@
 //! What was done with a scene's light, in lines for people and values for machines.
 
-use super::report::{Report, count, seconds};
+use super::report::{Report, count, step};
 use holodrive::points::PointCloud;
 use holodrive::points::budget::{Limit, Rays};
 use holodrive::points::colour::{Gamut, Lasers};
 use holodrive::points::{ScenePoints, WhiteLevel};
 use holodrive::units::show_length;
-use serde_json::Value;
+use serde_json::json;
 
 pub(super) fn report_cloud(cloud: &PointCloud, elapsed: f64, report: &mut Report) {
-    let depth = cloud.depth_range();
-    report.add("points", cloud.points.len(), "");
-    report.add_serialised("depth", &depth, "");
+    let (points, depth) = (cloud.points.len(), cloud.depth_range());
+    report.section(json!({ "points": points, "depth": depth, "points_seconds": elapsed }));
     let range =
         depth.map(|(far, near)| format!(", z {} … {}", show_length(far), show_length(near))).unwrap_or_default();
-    report.add(
-        "points_seconds",
-        elapsed,
-        format!("points       {:>8}  {} points{range}", seconds(elapsed), count(cloud.points.len())),
-    );
+    report.line(step("points", elapsed, format!("{} points{range}", count(points))));
 }
 
 pub(super) fn report_light(scene: &ScenePoints, elapsed: f64, report: &mut Report) {
     report.warn(scene.warnings.iter());
-    let (light, trace) = (&scene.illumination, &scene.trace);
+    let (light, trace, placed) = (&scene.illumination, &scene.trace, &scene.placed);
+    let (energy, convergence) = (&light.energy, &light.convergence);
     let load = (elapsed - light.seconds - trace.seconds).max(0.0);
-    report.add("scene_seconds", load, format!("scene        {:>8}", seconds(load)));
-    let energy = &light.energy;
-    for (key, value) in
-        [("energy_emitted", energy.emitted), ("energy_absorbed", energy.absorbed), ("energy_escaped", energy.escaped)]
-    {
-        report.add(key, value.to_array().to_vec(), "");
-    }
-    report.add("lamp_images", light.lamp_images, "");
-    report.add("photons", light.photons, "");
+    report.section(json!({
+        "scene_seconds": load,
+        "energy_emitted": energy.emitted.to_array(),
+        "energy_absorbed": energy.absorbed.to_array(),
+        "energy_escaped": energy.escaped.to_array(),
+        "lamp_images": light.lamp_images,
+        "photons": light.photons,
+        "light_residual": convergence.residual,
+        "light_seconds": light.seconds,
+        "patches": light.patches,
+        "rays": trace.rays,
+        "trace_seconds": trace.seconds,
+        "mirrored_points": trace.by_mirror,
+        "beyond_cone": placed.beyond_cone,
+        "beyond_cone_light": placed.beyond_cone_light,
+    }));
+    report.line(step("scene", load, ""));
     let mut optics = String::new();
     if light.lamp_images > 0 {
         optics += &format!(", {} mirror images of lamps", count(light.lamp_images));
@@ -41,39 +45,25 @@ pub(super) fn report_light(scene: &ScenePoints, elapsed: f64, report: &mut Repor
     if light.photons > 0 {
         optics += &format!(", {} photons by way of optics", count(light.photons));
     }
-    report.add("light_residual", light.convergence.residual, "");
-    report.add(
-        "light_seconds",
-        light.seconds,
-        format!(
-            "light        {:>8}  {} patches{optics}, {} iterations to a residual of {:.1e}; energy in = absorbed + escaped within {:.2} %",
-            seconds(light.seconds),
-            count(light.patches),
-            light.convergence.iterations,
-            light.convergence.residual,
-            100.0 * light.energy.imbalance()
-        ),
+    let what = format!(
+        "{} patches{optics}, {} iterations to a residual of {:.1e}; energy in = absorbed + escaped within {:.2} %",
+        count(light.patches),
+        convergence.iterations,
+        convergence.residual,
+        100.0 * energy.imbalance()
     );
-    report.add("patches", light.patches, "");
-    report.add("rays", trace.rays, "");
-    report.add(
-        "trace_seconds",
-        trace.seconds,
-        format!("rays         {:>8}  {} rays", seconds(trace.seconds), count(trace.rays as usize)),
-    );
+    report.line(step("light", light.seconds, what));
+    report.line(step("rays", trace.seconds, format!("{} rays", count(trace.rays as usize))));
     if let Some(rays) = &scene.rays {
         report_budget(rays, scene, report);
     }
-    report_cloud(&scene.placed.cloud, 0.0, report);
-    report_exposure(&scene.white, report);
-    report.add("mirrored_points", trace.by_mirror, "");
-    report.add("beyond_cone", scene.placed.beyond_cone, "");
-    report.add("beyond_cone_light", scene.placed.beyond_cone_light, "");
-    if scene.placed.beyond_cone > 0 {
+    report_cloud(&placed.cloud, 0.0, report);
+    report_white(&scene.white, report);
+    if placed.beyond_cone > 0 {
         report.warn([format!(
             "{} points ({:.1} % of the light) stand where the panel cannot send light to the eye; move the viewer back or use a finer pitch",
-            count(scene.placed.beyond_cone),
-            100.0 * scene.placed.beyond_cone_light
+            count(placed.beyond_cone),
+            100.0 * placed.beyond_cone_light
         )]);
     }
 }
@@ -89,15 +79,17 @@ fn report_budget(rays: &Rays, scene: &ScenePoints, report: &mut Report) {
     };
     let viewer = show_length(scene.view.placing.eye.z);
     let [across, down] = rays.size;
-    report.add_serialised("budget", rays, "");
-    report.add("", Value::Null, format!("budget                 {across} × {down} rays, {why}; an eye at {viewer} resolves {eye} (1/60°), the panel {panel} (pitch, or λz/D)"));
+    report.value("budget", rays);
+    report.line(format!("budget                 {across} × {down} rays, {why}; an eye at {viewer} resolves {eye} (1/60°), the panel {panel} (pitch, or λz/D)"));
 }
 
-fn report_exposure(exposed: &WhiteLevel, report: &mut Report) {
-    report.add_serialised("exposure", exposed, "");
-    report.add("white", exposed.white, "");
-    report.add("clipped_light", exposed.clipped_light(), "");
-    report.add("clipped_points", exposed.clipped_points(), "");
+fn report_white(exposed: &WhiteLevel, report: &mut Report) {
+    report.section(json!({
+        "exposure": exposed,
+        "white": exposed.white,
+        "clipped_light": exposed.clipped_light(),
+        "clipped_points": exposed.clipped_points(),
+    }));
     let share = format!(
         "{} points ({:.2} %) with {:.2} % of the light",
         count(exposed.brighter_points),
@@ -115,7 +107,7 @@ fn report_exposure(exposed: &WhiteLevel, report: &mut Report) {
             exposed.brightest / exposed.white
         ),
     };
-    report.add("", Value::Null, format!("exposure               white is {:.3} W/(m² sr); {did}", exposed.white));
+    report.line(format!("exposure               white is {:.3} W/(m² sr); {did}", exposed.white));
 }
 
 /// The three lasers, and the light that they cannot make.
@@ -134,10 +126,6 @@ pub(super) fn report_gamut(lasers: &Lasers, gamut: &Gamut, report: &mut Report) 
             100.0 * gamut.least_kept
         ),
     };
-    report.add_serialised("gamut", gamut, "");
-    report.add(
-        "",
-        Value::Null,
-        format!("colour                 {names}; white (D65) is powers of {powers}; {outside}"),
-    );
+    report.value("gamut", gamut);
+    report.line(format!("colour                 {names}; white (D65) is powers of {powers}; {outside}"));
 }

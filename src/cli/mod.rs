@@ -29,6 +29,7 @@ mod serve;
 mod show;
 mod steps;
 mod true_views;
+mod usage;
 
 use args::{Cli, Command};
 use clap::FromArgMatches;
@@ -47,7 +48,12 @@ fn without_display(asked: bool) -> holodrive::Result<()> {
 
 /// Parses, runs and maps the outcome to an exit code: 0 done, 2 bad flags or input, 130 interrupted.
 pub(crate) fn main() -> ExitCode {
-    let cli = match args::command().try_get_matches().and_then(|typed| Cli::from_arg_matches(&typed)) {
+    let parsed = args::command().try_get_matches().and_then(|typed| {
+        let mut cli = Cli::from_arg_matches(&typed)?;
+        usage::tell(&mut cli.command, &typed);
+        Ok(cli)
+    });
+    let cli = match parsed {
         Ok(cli) => cli,
         Err(refused) if matches!(refused.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
             // Help into a closed pipe (`holodrive --help | head -1`) is no failure.

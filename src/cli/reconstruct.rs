@@ -19,6 +19,7 @@ use std::time::Instant;
 
 pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
     let mut report = Report::new("reconstruct");
+    report.warn(&args.idle);
     let bar = Bar::new();
     let (ExposureLight { field, settings, .. }, content) = match input(&args.input)? {
         Input::Field(path) => {
@@ -36,10 +37,12 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
             let profile = args.panel.as_deref().map(PanelProfile::find).transpose()?;
             let (frame, warnings) = Frame::read(&path, profile.as_ref(), args.wavelength)?;
             report.warn(warnings);
-            let wavefront_error = args.bend.as_deref().map(|path| wavefront::read(path, None)).transpose()?;
-            let faults = Faults { crosstalk: args.crosstalk, wavefront_error, ..Faults::default() };
-            let simulation = Simulation { subsamples: args.subpixels, faults, ..Simulation::default() };
-            let bench = Bench { simulation, zero_order_stop: args.zero_order_stop };
+            let typed = &args.simulation;
+            let wavefront_error =
+                typed.wavefront_error.as_deref().map(|path| wavefront::read(path, None)).transpose()?;
+            let faults = Faults { crosstalk: typed.crosstalk, wavefront_error, ..Faults::default() };
+            let simulation = Simulation { subsamples: typed.subpixels, faults, ..Simulation::default() };
+            let bench = Bench { simulation, zero_order_stop: typed.zero_order_stop };
             let light = pipeline::light(&frame, &bench, &bar.progress)?;
             if let Some(encoding) = &frame.metadata.encoding {
                 let share = orders(&light.field, encoding);

@@ -75,7 +75,7 @@ pub(super) fn scene(light: &SceneArgs, placement: &PlacementArgs, default_white:
             bounces: light.bounces,
             final_gather: light.final_gather,
             photons: light.photons,
-            seed: light.seed,
+            seed: light.random.seed,
             ..IlluminationSettings::default()
         },
         trace: TraceSettings {
@@ -83,16 +83,16 @@ pub(super) fn scene(light: &SceneArgs, placement: &PlacementArgs, default_white:
             height: light.rays.1 as u32,
             bounces: light.bounces,
             mirror_depth: light.mirror_depth,
-            seed: light.seed,
+            seed: light.random.seed,
             ..TraceSettings::default()
         },
         points: light.points,
         placement: self::placement(placement),
         phase: match placement.phase {
-            Phase::Random { .. } => Phase::Random { seed: light.seed },
+            Phase::Random { .. } => Phase::Random { seed: light.random.seed },
             other => other,
         },
-        white: match placement.white.unwrap_or(default_white) {
+        white: match light.white.unwrap_or(default_white) {
             White::Auto => WhitePoint::Auto,
             White::None => WhitePoint::Unlimited,
             White::At(value) => WhitePoint::At(value),
@@ -156,7 +156,7 @@ pub(super) fn settings(args: &ShowArgs, setup: Setup) -> Result<(Setup, Settings
     let multiplexing = if args.sparse { Multiplexing::Sparse } else { Multiplexing::Phases };
     let sub_frames = match args.subframes {
         1 => None,
-        count => Some(SubFrames::new(count, multiplexing, args.light.seed)?),
+        count => Some(SubFrames::new(count, multiplexing, args.light.random.seed)?),
     };
     let settings = Settings {
         scene: scene(&args.light, &args.placement, White::Auto),

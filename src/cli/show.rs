@@ -41,6 +41,7 @@ struct Shown {
 fn run(args: &ShowArgs) -> Result<Report> {
     let begin = Instant::now();
     let mut report = Report::new("show");
+    report.warn(&args.idle);
     if args.live {
         #[cfg(feature = "display")]
         return super::live::show(args, report);
@@ -144,7 +145,7 @@ fn frames(
             Ok(Shown { frames: vec![Some(frame)], content: metadata.content, scene: None })
         }
         _ => {
-            let scale = args.placement.depth_scale;
+            let scale = args.map.depth_scale;
             let points = Points::load(source, &settings.scene, scale, setup, progress, report)?;
             ply::write(&out.join("points.ply"), &points.cloud, &points.metadata)?;
             if let Some(scene) = &points.scene {

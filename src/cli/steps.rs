@@ -21,6 +21,7 @@ use std::time::Instant;
 
 pub(super) fn points(args: &PointsArgs) -> Result<Report> {
     let mut report = Report::new("points");
+    report.warn(&args.idle);
     let setup = resolve::setup_in_color(&args.panel, &args.color, &mut report)?;
     let source = input(&args.scene)?;
     let no_scene = || Error::input(&args.scene, "is no scene: .gltf or .glb");
@@ -29,7 +30,7 @@ pub(super) fn points(args: &PointsArgs) -> Result<Report> {
     }
     let bar = Bar::new();
     let settings = resolve::scene(&args.light, &args.placement, White::None);
-    let scale = args.placement.depth_scale;
+    let scale = args.map.depth_scale;
     let points = Points::load(&source, &settings, scale, &setup, &bar.progress, &mut report)?;
     if let Some(lasers) = &setup.lasers {
         report_gamut(lasers, &lasers.gamut(&points.cloud), &mut report);
@@ -74,6 +75,7 @@ pub(super) fn write_traced(path: &Path, scene: &ScenePoints) -> Result<()> {
 
 pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
     let mut report = Report::new("compute");
+    report.warn(&args.idle);
     let setup = resolve::setup_in_color(&args.panel, &args.color, &mut report)?;
     let bar = Bar::new();
     let source = input(&args.input)?;
@@ -91,7 +93,7 @@ pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
         hologram: resolve::hologram(&args.hologram),
         ..Settings::default()
     };
-    let scale = args.placement.depth_scale;
+    let scale = args.map.depth_scale;
     let points = Points::load(&source, &settings.scene, scale, &setup, &bar.progress, &mut report)?;
     let maker = Maker { input: &args.input, setup: &setup, settings: &settings, progress: &bar.progress };
     maker.fields(&points, &args.output, &mut report)?;

@@ -34,10 +34,10 @@ pub(super) fn compute(
         scale: args.placement.scale,
         segment,
         error: args.hologram.error,
-        seed: args.light.seed,
+        seed: args.light.random.seed,
     };
     let light = (&args.light.file, args.light.bounces, args.light.photons);
-    let task = task(path, light, args.placement.white)?;
+    let task = task(path, light, args.light.white)?;
     let seen = views.field(&task, InstructionSet::detect(), progress)?;
     let work = &seen.work;
     report.add_serialised(

@@ -1,6 +1,6 @@
 //! Flags of where a scene stands before the panel.
 
-use super::parse::{White, one_of, white};
+use super::parse::one_of;
 use clap::{Args, ValueEnum};
 use holodrive::points::images::DepthScale;
 use holodrive::points::placement::Phase;
@@ -33,10 +33,12 @@ pub(crate) struct PlacementArgs {
     /// Initial phase of the points.
     #[arg(hide_short_help = true, long, value_parser = one_of::<Phase>(), default_value = "random", value_name = "PHASE")]
     pub(crate) phase: Phase,
-    /// Clip light brighter than white, by its largest of red, green and blue: auto (a quarter above what 97 % of the lit
-    /// pixels do not pass), none, or a radiance [default: none for `points`, auto otherwise].
-    #[arg(hide_short_help = true, long, value_parser = white, value_name = "WHITE")]
-    pub(crate) white: Option<White>,
+}
+
+/// How a picture's depth map is read, or a scene's is written.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Placement")]
+pub(crate) struct DepthMapArgs {
     /// Depth map of a picture: which end of its gray scale is near.
     #[arg(hide_short_help = true, long, value_parser = one_of::<DepthScale>(), default_value = "white-near", value_name = "SCALE")]
     pub(crate) depth_scale: DepthScale,

@@ -1,6 +1,6 @@
 //! Flags of scenes: what of a file is taken, how it is lit and traced.
 
-use super::parse::{budget, one_of, size};
+use super::parse::{White, budget, one_of, size, white};
 use clap::Args;
 use holodrive::illumination::FormFactor;
 use holodrive::points::budget::Budget;
@@ -63,6 +63,18 @@ pub(crate) struct SceneArgs {
     /// Photons that lamps send through curved mirrors and glass (caustics); none are sent where there is none.
     #[arg(hide_short_help = true, long, default_value_t = 400_000, value_name = "N")]
     pub(crate) photons: u32,
+    /// Clip light brighter than white, by its largest of red, green and blue: auto (a quarter above what 97 % of the lit
+    /// pixels do not pass), none, or a radiance [default: none for `points`, auto otherwise].
+    #[arg(hide_short_help = true, long, value_parser = white, value_name = "WHITE")]
+    pub(crate) white: Option<White>,
+    #[command(flatten)]
+    pub(crate) random: RandomArgs,
+}
+
+/// What is random: phases, and the rays of light and eye.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Scene")]
+pub(crate) struct RandomArgs {
     /// Seed of all random numbers.
     #[arg(hide_short_help = true, long, default_value_t = 1, value_name = "N")]
     pub(crate) seed: u64,

@@ -25,7 +25,7 @@ pub(crate) struct SequenceArgs {
     #[arg(hide_short_help = true, long, value_name = "SECONDS", allow_hyphen_values = true)]
     pub(crate) to: Option<f64>,
     /// Frames that are made ahead of the one on the panel; `all` makes every one before the first is shown.
-    #[arg(hide_short_help = true, long, default_value = "4", value_parser = ahead, value_name = "N|all")]
+    #[arg(requires = "monitor", hide_short_help = true, long, default_value = "4", value_parser = ahead, value_name = "N|all")]
     pub(crate) ahead: Ahead,
     /// The input is raw video: bare frames of this size, one after another.
     #[arg(hide_short_help = true, long, value_parser = size, value_name = "WxH")]
@@ -38,6 +38,6 @@ pub(crate) struct SequenceArgs {
     #[arg(hide_short_help = true, long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) focus: Option<f64>,
     /// Write a line of JSON for each frame to this file (a pipe will do) as soon as the panel has settled on it.
-    #[arg(hide_short_help = true, long, value_name = "FILE")]
+    #[arg(requires = "monitor", hide_short_help = true, long, value_name = "FILE")]
     pub(crate) events: Option<PathBuf>,
 }

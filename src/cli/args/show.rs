@@ -5,7 +5,7 @@ use super::hologram::HologramArgs;
 use super::panel::{ColorArgs, PanelArgs};
 #[cfg(feature = "display")]
 use super::parse::one_of;
-use super::placement::PlacementArgs;
+use super::placement::{DepthMapArgs, PlacementArgs};
 use super::scene::SceneArgs;
 use super::sequence::SequenceArgs;
 use clap::Args;
@@ -35,6 +35,8 @@ pub(crate) struct ShowArgs {
     #[command(flatten)]
     pub(crate) placement: PlacementArgs,
     #[command(flatten)]
+    pub(crate) map: DepthMapArgs,
+    #[command(flatten)]
     pub(crate) hologram: HologramArgs,
     /// Encode so many sub-frames with phases of their own; shown faster than an eye sees, their speckle averages out.
     #[arg(
@@ -59,13 +61,13 @@ pub(crate) struct ShowArgs {
     /// How long to show it, in seconds [default: until Esc].
     ///
     /// Of frames in time it is how long the last one stays; without it they end with their last.
-    #[arg(help_heading = "Display", long, value_name = "SECONDS")]
+    #[arg(requires = "monitor", help_heading = "Display", long, value_name = "SECONDS")]
     pub(crate) hold: Option<f64>,
     /// Block the zero order within this angle of the axis, where the encoding's Fourier stop stands; 0deg lets it pass.
     #[arg(hide_short_help = true, help_heading = "Display", long, default_value = "0.05deg", value_parser = units::angle, value_name = "ANGLE")]
     pub(crate) zero_order_stop: f64,
     /// Show the frame even where a gamma table (night light) alters its levels; the report says what does.
-    #[arg(hide_short_help = true, help_heading = "Display", long)]
+    #[arg(requires = "monitor", hide_short_help = true, help_heading = "Display", long)]
     pub(crate) allow_altered_levels: bool,
     /// A square of SIZE video pixels in a corner (top-left, top-right, bottom-left, bottom-right) that toggles between black
     /// and white with every frame, for a photodiode.
@@ -73,11 +75,11 @@ pub(crate) struct ShowArgs {
     pub(crate) trigger_patch: Option<String>,
     /// What brings the levels to the screen.
     #[cfg(feature = "display")]
-    #[arg(hide_short_help = true, help_heading = "Display", long, value_parser = one_of::<Presenter>(), default_value = "auto", value_name = "NAME")]
+    #[arg(requires = "monitor", hide_short_help = true, help_heading = "Display", long, value_parser = one_of::<Presenter>(), default_value = "auto", value_name = "NAME")]
     pub(crate) present: Presenter,
     /// What is done when the monitor is unplugged or switched off.
     #[cfg(feature = "display")]
-    #[arg(hide_short_help = true, help_heading = "Display", long, value_parser = one_of::<OnAbsence>(), default_value = "end", value_name = "WHAT")]
+    #[arg(requires = "monitor", hide_short_help = true, help_heading = "Display", long, value_parser = one_of::<OnAbsence>(), default_value = "end", value_name = "WHAT")]
     pub(crate) on_absence: OnAbsence,
     /// Follow the scene: compute again when its file changes, or when keys move it.
     ///
@@ -86,6 +88,7 @@ pub(crate) struct ShowArgs {
     pub(crate) live: bool,
     /// With --live: where the operator's view is shown, never on the panel's monitor: a monitor, auto or none.
     #[arg(
+        requires = "live",
         hide_short_help = true,
         help_heading = "Display",
         long,
@@ -95,4 +98,7 @@ pub(crate) struct ShowArgs {
     pub(crate) operator: String,
     #[command(flatten)]
     pub(crate) sequence: SequenceArgs,
+    /// What was typed and is of no use for this input.
+    #[arg(skip)]
+    pub(crate) idle: Option<String>,
 }

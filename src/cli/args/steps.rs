@@ -4,7 +4,7 @@ use super::encoding::EncodingArgs;
 use super::hologram::HologramArgs;
 use super::panel::{ColorArgs, PanelArgs};
 use super::parse::{lengths, one_of, position, size};
-use super::placement::PlacementArgs;
+use super::placement::{DepthMapArgs, PlacementArgs};
 use super::scene::SceneArgs;
 use clap::Args;
 use holodrive::points::ply::Frame;
@@ -36,6 +36,11 @@ pub(crate) struct PointsArgs {
     pub(crate) light: SceneArgs,
     #[command(flatten)]
     pub(crate) placement: PlacementArgs,
+    #[command(flatten)]
+    pub(crate) map: DepthMapArgs,
+    /// What was typed and is of no use for this input.
+    #[arg(skip)]
+    pub(crate) idle: Option<String>,
 }
 
 #[derive(Debug, Args)]
@@ -56,6 +61,8 @@ pub(crate) struct ComputeArgs {
     #[command(flatten)]
     pub(crate) placement: PlacementArgs,
     #[command(flatten)]
+    pub(crate) map: DepthMapArgs,
+    #[command(flatten)]
     pub(crate) hologram: HologramArgs,
     /// A picture with depth in this many planes instead of points.
     ///
@@ -68,6 +75,9 @@ pub(crate) struct ComputeArgs {
     /// A scene seen truly from each segment of so many pixels of the panel, as plates are: with --placement model.
     #[arg(help_heading = "Hologram", hide_short_help = true, long, value_name = "PIXELS", conflicts_with_all = ["layers", "engine"])]
     pub(crate) views: Option<u64>,
+    /// What was typed and is of no use for this input.
+    #[arg(skip)]
+    pub(crate) idle: Option<String>,
 }
 
 #[derive(Debug, Args)]
@@ -101,13 +111,42 @@ pub(crate) struct EncodeArgs {
     /// The frame to write.
     #[arg(short, long, default_value = "frame.png", value_name = "FILE")]
     pub(crate) output: PathBuf,
-    /// Part of the panel's sides that a picture takes; the light beside it is free.
-    #[arg(help_heading = "Encoding", long, default_value_t = 0.75, value_name = "SHARE")]
-    pub(crate) window: f64,
+    #[command(flatten)]
+    pub(crate) picture: PictureArgs,
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
     #[command(flatten)]
     pub(crate) encoding: EncodingArgs,
+    /// What was typed and is of no use for this input.
+    #[arg(skip)]
+    pub(crate) idle: Option<String>,
+}
+
+/// How a picture is laid onto the panel.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Encoding")]
+pub(crate) struct PictureArgs {
+    /// Part of the panel's sides that a picture takes; the light beside it is free.
+    #[arg(help_heading = "Encoding", long, default_value_t = 0.75, value_name = "SHARE")]
+    pub(crate) window: f64,
+}
+
+/// The simulated panel that a frame is on, and the stop behind it.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Simulated panel")]
+pub(crate) struct SimulationArgs {
+    /// Block the zero order within this angle of the axis, where the encoding's Fourier stop stands; 0deg lets it pass.
+    #[arg(hide_short_help = true, long, default_value = "0.05deg", value_parser = units::angle, value_name = "ANGLE")]
+    pub(crate) zero_order_stop: f64,
+    /// Samples per pixel and side of the simulated panel: 1, or more to see replica orders.
+    #[arg(hide_short_help = true, long, default_value_t = 1, value_name = "N")]
+    pub(crate) subpixels: usize,
+    /// Fault of the simulated panel: phases of neighbouring pixels blend by a Gaussian of so many pixels.
+    #[arg(hide_short_help = true, long, default_value_t = 0.0, value_name = "PIXELS")]
+    pub(crate) crosstalk: f64,
+    /// Fault of the simulated panel: its wavefront error, as a file like those of encode's --correction.
+    #[arg(hide_short_help = true, long, alias = "bend", value_name = "FILE")]
+    pub(crate) wavefront_error: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -141,7 +180,7 @@ pub(crate) struct ReconstructArgs {
     #[arg(help_heading = "View", long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) focus: Option<f64>,
     /// Diameter of the eye's pupil.
-    #[arg(help_heading = "View", long, default_value = "4mm", value_parser = units::positive_length, value_name = "LENGTH")]
+    #[arg(help_heading = "View", long, requires = "eye", default_value = "4mm", value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) pupil: f64,
     /// Pixels of the picture [default: one for each sample of the field].
     #[arg(help_heading = "Picture", long, value_parser = size, value_name = "WxH")]
@@ -152,22 +191,15 @@ pub(crate) struct ReconstructArgs {
     /// Part of the pixels that is not shown brighter than white.
     #[arg(help_heading = "Picture", long, default_value_t = 0.995, value_name = "PART")]
     pub(crate) white: f64,
-    /// Block the zero order within this angle of the axis, where the encoding's Fourier stop stands; 0deg lets it pass.
-    #[arg(hide_short_help = true, help_heading = "Panel", long, default_value = "0.05deg", value_parser = units::angle, value_name = "ANGLE")]
-    pub(crate) zero_order_stop: f64,
-    /// Samples per pixel and side of the simulated panel: 1, or more to see replica orders.
-    #[arg(hide_short_help = true, help_heading = "Panel", long, default_value_t = 1, value_name = "N")]
-    pub(crate) subpixels: usize,
-    /// Fault of the simulated panel: phases of neighbouring pixels blend by a Gaussian of so many pixels.
-    #[arg(hide_short_help = true, help_heading = "Panel", long, default_value_t = 0.0, value_name = "PIXELS")]
-    pub(crate) crosstalk: f64,
-    /// Fault of the simulated panel: its bend, as a file like those of encode's --correction.
-    #[arg(hide_short_help = true, help_heading = "Panel", long, value_name = "FILE")]
-    pub(crate) bend: Option<PathBuf>,
     /// With --eye: a picture from each of so many places, beside each other × one above the other; names get -column-row.
     #[arg(help_heading = "View", long, value_parser = size, value_name = "CxR", requires = "eye", requires = "eye_box")]
     pub(crate) views: Option<(usize, usize)>,
     /// Width and height over which --views moves the eye.
     #[arg(help_heading = "View", long, value_parser = lengths, value_name = "LENGTH[,LENGTH]", requires = "views")]
     pub(crate) eye_box: Option<[f64; 2]>,
+    #[command(flatten)]
+    pub(crate) simulation: SimulationArgs,
+    /// What was typed and is of no use for this input.
+    #[arg(skip)]
+    pub(crate) idle: Option<String>,
 }
