@@ -1,4 +1,12 @@
 //! Files that appear whole or not at all.
+//!
+//! ```
+//! let path = std::env::temp_dir().join(format!("holodrive-{}.txt", std::process::id()));
+//! holodrive::files::write_bytes(&path, b"whole")?;
+//! assert_eq!(std::fs::read(&path).map_err(holodrive::Error::io(&path))?, b"whole");
+//! # std::fs::remove_file(&path).map_err(holodrive::Error::io(&path))?;
+//! # Ok::<(), holodrive::Error>(())
+//! ```
 
 use crate::error::{Error, Result};
 use std::fs::{self, File};

@@ -3,6 +3,15 @@
 //! A step takes `&Progress`, calls [`Progress::start`] with its amount of work, [`Progress::advance`] as it goes and
 //! [`Progress::check`] at least every 50 ms; whoever started it watches the counters from another thread or sets
 //! [`Progress::stop`]. The library never prints.
+//!
+//! ```
+//! let progress = holodrive::progress::Progress::new();
+//! progress.start("rays", 10);
+//! progress.advance(4);
+//! assert_eq!(progress.snapshot(), ("rays".into(), 4, 10));
+//! progress.stop();
+//! assert!(progress.check().is_err());
+//! ```
 
 use crate::error::{Error, Result};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

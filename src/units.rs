@@ -1,6 +1,15 @@
 //! Lengths, angles, times and rates as people write them (`8um`, `632.8nm`, `2deg`, `10ms`, `60Hz`) to SI f64 and back.
 //!
 //! A bare number is refused: at the border every quantity says its unit.
+//!
+//! ```
+//! use holodrive::units;
+//!
+//! assert_eq!(units::length("632.8nm")?, 632.8e-9);
+//! assert_eq!(units::show_length(8e-6), "8um");
+//! assert!(units::length("8").is_err(), "eight of what?");
+//! # Ok::<(), holodrive::Error>(())
+//! ```
 
 use crate::error::{Error, Result};
 
@@ -60,6 +69,15 @@ fn parse(text: &str, units: &[(&str, f64)], kind: &'static str, example: &str) -
     Ok(value)
 }
 
+/// The value, if it is greater than zero.
+fn positive(value: f64, text: &str, kind: &'static str) -> Result<f64> {
+    if value > 0.0 { Ok(value) } else { Err(Error::out_of_range(kind, quoted(text), "must be greater than zero")) }
+}
+
+fn quoted(text: &str) -> String {
+    format!("`{}`", text.trim())
+}
+
 /// Reads a length with its unit: `8um` → 8e-6 [m]. Negative lengths are allowed; the caller knows its domain.
 pub fn length(text: &str) -> Result<f64> {
     parse(text, &LENGTHS, "length", "8um, 632.8nm, 0.25m")
@@ -67,18 +85,12 @@ pub fn length(text: &str) -> Result<f64> {
 
 /// Reads a length that must be positive.
 pub fn positive_length(text: &str) -> Result<f64> {
-    let value = length(text)?;
-    if value > 0.0 { Ok(value) } else { Err(Error::parameter("length", format!("`{text}` must be greater than zero"))) }
+    positive(length(text)?, text, "length")
 }
 
 /// Reads an amount of memory with its unit: `2GB` → 2³¹ [bytes].
 pub fn memory(text: &str) -> Result<u64> {
-    let value = parse(text, &MEMORIES, "memory", "500MB, 2GB")?;
-    if value >= 1.0 {
-        Ok(value as u64)
-    } else {
-        Err(Error::parameter("memory", format!("`{text}` must be greater than zero")))
-    }
+    positive(parse(text, &MEMORIES, "memory", "500MB, 2GB")?.floor(), text, "memory").map(|bytes| bytes as u64)
 }
 
 /// Reads an angle with its unit: `2deg` → 0.0349 [rad].
@@ -89,17 +101,12 @@ pub fn angle(text: &str) -> Result<f64> {
 /// Reads a time with its unit that is not negative: `10ms` → 0.01 [s].
 pub fn duration(text: &str) -> Result<f64> {
     let value = parse(text, &TIMES, "time", "10ms, 0.5s")?;
-    if value >= 0.0 { Ok(value) } else { Err(Error::parameter("time", format!("`{text}` must not be negative"))) }
+    if value >= 0.0 { Ok(value) } else { Err(Error::out_of_range("time", quoted(text), "must not be negative")) }
 }
 
 /// Reads a positive rate with its unit: `60Hz` → 60 [Hz].
 pub fn frequency(text: &str) -> Result<f64> {
-    let value = parse(text, &FREQUENCIES, "frequency", "60Hz, 1.44kHz")?;
-    if value > 0.0 {
-        Ok(value)
-    } else {
-        Err(Error::parameter("frequency", format!("`{text}` must be greater than zero")))
-    }
+    positive(parse(text, &FREQUENCIES, "frequency", "60Hz, 1.44kHz")?, text, "frequency")
 }
 
 /// Prints a length [m] with the unit that keeps it between 1 and 1000, to at most six significant digits.

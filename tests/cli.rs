@@ -206,7 +206,7 @@ fn bad_pictures_and_stacks_end_in_one_line() {
     refused(f, &["compute", "gone.png@-100mm"], "gone.png");
     refused(f, &["compute", "black.png@-100mm"], "black everywhere");
     refused(f, &["compute", "a.png@700mm"], "not in front of the eye");
-    refused(f, &["compute", "a.png+a.png", "--layers", "0"], "one to 4096");
+    refused(f, &["compute", "a.png+a.png", "--layers", "0"], "1 to 4096");
     refused(f, &["compute", "a.png+a.png", "--layers", "16", "--memory", "10MB"], "give more memory or fewer layers");
     refused(f, &["compute", "a.png@-100mm", "--layers", "3"], "leave --layers out");
     refused(f, &["compute", &scene("cornell.gltf"), "--layers", "3"], "picture with depth");

@@ -9,9 +9,9 @@ use holodrive::field::npy::{self, Content};
 use holodrive::hologram::layers::{self, SliceSettings};
 use holodrive::panel::Setup;
 use holodrive::points::colour::NAMES;
-use holodrive::points::images::{RgbDepth, Window};
+use holodrive::points::images::{PictureWindow, RgbDepth};
 use holodrive::points::placement::Phase;
-use holodrive::points::slices::{Light, Slices};
+use holodrive::points::slices::{LightColor, Slices};
 use holodrive::progress::Progress;
 use holodrive::units::show_length;
 use holodrive::{Error, Result};
@@ -30,7 +30,7 @@ pub(super) fn compute(
     let slices = match (input, args.layers) {
         (Input::Images(rgb, depth), Some(count)) => {
             let picture = RgbDepth::read(rgb, depth, args.map.depth_scale, &placement)?;
-            let window = Window::new(&placement, picture.size(), &setup.grid)?;
+            let window = PictureWindow::new(&placement, picture.size(), &setup.grid)?;
             Slices::of_depth(picture, window, &setup.grid, count)?
         }
         (Input::Stack(_), Some(_)) => {
@@ -47,9 +47,9 @@ pub(super) fn compute(
         }
     };
     let settings = SliceSettings { occlude: !args.see_through, random_phase: seed, memory: args.hologram.memory };
-    let lights: Vec<(f64, Light)> = match &setup.lasers {
-        None => vec![(setup.wavelength, Light::Channel(args.hologram.channel))],
-        Some(lasers) => (0..3).map(|i| (lasers.wavelengths()[i], Light::Laser(lasers, i))).collect(),
+    let lights: Vec<(f64, LightColor)> = match &setup.lasers {
+        None => vec![(setup.wavelength, LightColor::Channel(args.hologram.channel))],
+        Some(lasers) => (0..3).map(|i| (lasers.wavelengths()[i], LightColor::Laser(lasers, i))).collect(),
     };
     let colored = lights.len() > 1;
     for (i, (wavelength, light)) in lights.into_iter().enumerate() {

@@ -137,11 +137,11 @@ fn a_glass_ball_focuses_light_on_the_floor() {
         let p = origin + direction * (-b - disc.sqrt());
         let normal = (p - centre) / radius;
         let cosine = -direction.dot(normal);
-        let inside = paths::refracted(direction, normal, 1.0 / n).unwrap();
+        let inside = reflection::refracted(direction, normal, 1.0 / n).unwrap();
         let q = p + inside * (-2.0 * inside.dot(p - centre));
         let out_normal = (q - centre) / radius;
-        let out = paths::refracted(inside, -out_normal, n).unwrap();
-        let through = (1.0 - paths::dielectric_reflectance(cosine, 1.0 / n)).powi(2);
+        let out = reflection::refracted(inside, -out_normal, n).unwrap();
+        let through = (1.0 - reflection::dielectric_reflectance(cosine, 1.0 / n)).powi(2);
         let end = q - out * (q.y / out.y);
         let ring = irradiance * 2.0 * PI * h * radius / f64::from(rings) * (1.0 + slope * slope).powi(-2);
         all += ring * through;

@@ -4,11 +4,12 @@
 //! multiplied by the visible part, Σ w v / Σ w over stratified points of the emitter, w = cosθ cosθ′/r². So there is no
 //! noise outside of penumbrae, and none of a patch's shape inside.
 
+use super::emitter::{Emitter, EmitterPoint, Piece};
 use super::form_factor::{FormFactor, point_to_element, point_to_polygon};
 use super::paths::Optics;
 use super::sampling::triangle_weights;
 use super::shaft::Shaft;
-use super::surface::Surface;
+use super::surface::{ShadingPoint, Surface};
 use crate::random::Random;
 use crate::scene::bvh::{Hit, SceneBvh};
 use crate::scene::{LightKind, PunctualLight, Scene};
@@ -26,151 +27,6 @@ const MOST_EMITTERS: usize = 128;
 
 /// Tries to find a point of an emitter that lies above the horizon.
 pub(crate) const MOST_REDRAWS: u32 = 32;
-/// Halvings of a near emitter's sides: pieces of 1/32 of its size.
-const MOST_CUTS: u32 = 5;
-/// Weights of corner 1 and the last one at the corners that span an emitter.
-const UNIT_TRIANGLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-
-/// Part of an emitter: a triangle or parallelogram in its weights, spanned by three corners.
-#[derive(Clone, Copy, Debug)]
-struct Piece {
-    corners: [[f64; 2]; 3],
-    /// Form factor from the point that is lit.
-    factor: f64,
-}
-
-/// A convex emitting polygon: a triangle, or two that make a parallelogram.
-#[derive(Clone, Debug)]
-pub(crate) struct Emitter {
-    corners: Vec<DVec3>,
-    normal: DVec3,
-    area: f64,
-    radiance: Vec3,
-    two_sided: bool,
-    /// The triangle to look the emission up in, where it is not the same everywhere.
-    textured: Option<u32>,
-}
-
-impl Emitter {
-    /// Flux [W], all sides.
-    pub(crate) fn flux(&self) -> Vec3 {
-        let sides = if self.two_sided { 2.0 } else { 1.0 };
-        self.radiance * (self.area * PI * sides) as f32
-    }
-
-    /// A point of the polygon from the unit square, uniform in area, and the weights of corner 1 and the last one.
-    pub(crate) fn point(&self, u: f64, v: f64) -> (DVec3, [f64; 2]) {
-        self.within(&Piece { corners: UNIT_TRIANGLE, factor: 1.0 }, u, v)
-    }
-
-    fn is_parallelogram(&self) -> bool {
-        self.corners.len() == 4
-    }
-
-    /// The point with weights of corner 1 and the last one.
-    fn at(&self, [s, t]: [f64; 2]) -> DVec3 {
-        let (origin, last) = (self.corners[0], self.corners[self.corners.len() - 1]);
-        origin + (self.corners[1] - origin) * s + (last - origin) * t
-    }
-
-    /// A point of a piece from the unit square, uniform in area.
-    fn within(&self, piece: &Piece, u: f64, v: f64) -> (DVec3, [f64; 2]) {
-        let (s, t) = if self.is_parallelogram() { (u, v) } else { triangle_weights(u, v) };
-        let [o, a, b] = piece.corners;
-        let weights = std::array::from_fn(|k| o[k] + (a[k] - o[k]) * s + (b[k] - o[k]) * t);
-        (self.at(weights), weights)
-    }
-
-    /// Cuts the polygon until no piece is larger than it is far, so that all of a piece counts about equally.
-    fn pieces(&self, point: DVec3, normal: DVec3, factor: f64) -> Vec<Piece> {
-        let mut pieces = vec![Piece { corners: UNIT_TRIANGLE, factor }];
-        let reach = |piece: &Piece| {
-            let [o, a, b] = piece.corners.map(|w| self.at(w));
-            let middle = if self.is_parallelogram() { (a + b) * 0.5 } else { (o + a + b) / 3.0 };
-            ((a - o).length_squared().max((b - o).length_squared()), (middle - point).length_squared())
-        };
-        for _ in 0..MOST_CUTS {
-            if pieces.iter().all(|piece| reach(piece).0 <= reach(piece).1) {
-                break;
-            }
-            let mut finer = Vec::with_capacity(4 * pieces.len());
-            for piece in pieces {
-                let (size, distance) = reach(&piece);
-                if size <= distance {
-                    finer.push(piece);
-                    continue;
-                }
-                for corners in self.quarters(piece.corners) {
-                    let mut outline = corners.map(|w| self.at(w)).to_vec();
-                    if self.is_parallelogram() {
-                        outline.insert(2, outline[1] + outline[2] - outline[0]);
-                    }
-                    let factor = point_to_polygon(point, normal, &outline);
-                    if factor > 0.0 {
-                        finer.push(Piece { corners, factor });
-                    }
-                }
-            }
-            pieces = finer;
-        }
-        pieces
-    }
-
-    fn quarters(&self, [o, a, b]: [[f64; 2]; 3]) -> [[[f64; 2]; 3]; 4] {
-        let half = |p: [f64; 2], q: [f64; 2]| [(p[0] + q[0]) * 0.5, (p[1] + q[1]) * 0.5];
-        let (oa, ob, ab) = (half(o, a), half(o, b), half(a, b));
-        if self.is_parallelogram() {
-            let shift = |p: [f64; 2], by: [f64; 2]| [p[0] + by[0] - o[0], p[1] + by[1] - o[1]];
-            [[o, oa, ob], [oa, a, shift(oa, ob)], [ob, shift(oa, ob), b], [ab, shift(a, ob), shift(b, oa)]]
-        } else {
-            [[o, oa, ob], [oa, a, ab], [ob, ab, b], [ab, ob, oa]]
-        }
-    }
-
-    pub(crate) fn normal(&self) -> DVec3 {
-        self.normal
-    }
-
-    /// Corners in order [m].
-    pub(crate) fn corners(&self) -> &[DVec3] {
-        &self.corners
-    }
-
-    /// Area of one side [m²].
-    pub(crate) fn area(&self) -> f64 {
-        self.area
-    }
-
-    /// Radiance, averaged over the polygon.
-    pub(crate) fn mean_radiance(&self) -> Vec3 {
-        self.radiance
-    }
-
-    /// Radiance at a point of the polygon.
-    pub(crate) fn radiance_at(&self, scene: &Scene, position: DVec3) -> Vec3 {
-        if self.textured.is_none() {
-            return self.radiance;
-        }
-        let (origin, last) = (self.corners[0], self.corners[self.corners.len() - 1]);
-        let (u, v, p) = (self.corners[1] - origin, last - origin, position - origin);
-        let cross = u.cross(v);
-        let weights =
-            [p.cross(v).dot(cross), u.cross(p).dot(cross)].map(|w| (w / cross.length_squared()).clamp(0.0, 1.0));
-        self.radiance(scene, weights, position)
-    }
-
-    pub(crate) fn is_two_sided(&self) -> bool {
-        self.two_sided
-    }
-
-    /// Radiance at a point given by its weights.
-    pub(crate) fn radiance(&self, scene: &Scene, weights: [f64; 2], position: DVec3) -> Vec3 {
-        let Some(triangle) = self.textured else { return self.radiance };
-        let hit = Hit { triangle, distance: 0.0, position, barycentric: weights, front: true };
-        Surface::at(scene, &hit, 0.0).emission
-    }
-}
-
 /// All that shines by itself.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Emitters {
@@ -204,13 +60,13 @@ impl Emitters {
                 continue;
             }
             let textured = material.emissive_texture.is_some();
-            let radiance = if textured { mean_emission(scene, index as u32) } else { material.emissive };
-            if radiance.max_element() > 0.0 {
+            let mean_radiance = if textured { mean_emission(scene, index as u32) } else { material.emissive };
+            if mean_radiance.max_element() > 0.0 {
                 let emitter = Emitter {
                     corners: triangle.corners().to_vec(),
                     normal: triangle.normal(),
                     area: triangle.area(),
-                    radiance,
+                    mean_radiance,
                     two_sided: material.double_sided,
                     textured: textured.then_some(index as u32),
                 };
@@ -223,7 +79,7 @@ impl Emitters {
         let level = mean_radiance(scene, &merged);
         merged.retain(|(triangles, emitter)| {
             let reflected = f64::from(scene.material(triangles[0]).base_color.element_sum() / 3.0) * level;
-            let bright = f64::from(emitter.radiance.element_sum()) >= LEAST_CONTRAST * reflected;
+            let bright = f64::from(emitter.mean_radiance.element_sum()) >= LEAST_CONTRAST * reflected;
             emitter.area <= GLOWING_WALL * surface && bright
         });
         // Strongest first; equal ones in the order of the file, so that the choice is always the same.
@@ -250,30 +106,15 @@ impl Emitters {
         first.filter(|(_, emitter)| clear(emitter)).fold(0, |bits, (index, _)| bits | 1 << index)
     }
 
-    /// Irradiance over π [W/(m² sr)] at a point with unit shading `normal`; the point must be lifted off its surface.
+    /// Irradiance over π [W/(m² sr)] at a point: from emitting surfaces, and from punctual lights.
     pub(crate) fn light(
         &self,
-        bvh: &SceneBvh,
         optics: &Optics,
-        point: DVec3,
-        normal: DVec3,
-        rays: ShadowRays,
-        random: &mut Random,
-    ) -> Vec3 {
-        let (lamps, points) = self.light_apart(bvh, optics, point, normal, rays, random);
-        lamps + points
-    }
-
-    /// The same, apart: from emitting surfaces, and from punctual lights.
-    pub(crate) fn light_apart(
-        &self,
-        bvh: &SceneBvh,
-        optics: &Optics,
-        point: DVec3,
-        normal: DVec3,
+        at: ShadingPoint,
         rays: ShadowRays,
         random: &mut Random,
     ) -> (Vec3, Vec3) {
+        let ShadingPoint { position: point, normal } = at;
         let mut sum = Vec3::ZERO;
         let mut total = 0.0;
         let mut seen: [(usize, f64); MOST_EMITTERS] = [(0, 0.0); MOST_EMITTERS];
@@ -285,28 +126,32 @@ impl Emitters {
                 if factor > 0.0 {
                     seen[count] = (index, factor);
                     count += 1;
-                    total += factor * f64::from(emitter.radiance.element_sum());
+                    total += factor * f64::from(emitter.mean_radiance.element_sum());
                 }
             }
         }
         for &(index, factor) in &seen[..count] {
             let emitter = &self.polygons[index];
             if index < Clear::BITS as usize && rays.clear >> index & 1 == 1 {
-                sum += emitter.radiance * factor as f32;
+                sum += emitter.mean_radiance * factor as f32;
                 continue;
             }
-            let share = factor * f64::from(emitter.radiance.element_sum()) / total;
+            let share = factor * f64::from(emitter.mean_radiance.element_sum()) / total;
             let side = (f64::from(rays.first) * share).sqrt().ceil().max(1.0) as u32;
             let mut tally = Tally::default();
-            let pieces = emitter.pieces(point, normal, factor);
-            tally.cast((bvh, optics), emitter, &pieces, point, normal, side, random);
+            let pieces = emitter.pieces(at, factor);
+            tally.cast(optics, emitter, &pieces, at, side, random);
             if tally.is_mixed() && rays.penumbra > 0 {
                 let side = (f64::from(rays.penumbra) * share).sqrt().ceil() as u32;
-                tally.cast((bvh, optics), emitter, &pieces, point, normal, side, random);
+                tally.cast(optics, emitter, &pieces, at, side, random);
             }
             sum += tally.mean() * factor as f32;
         }
-        let points = self.punctual.iter().map(|light| punctual(bvh, optics, light, point, normal)).sum();
+        let arriving = |light: &PunctualLight| match punctual_light(optics.scene(), light, at) {
+            Some((strength, end)) => strength * optics.transmittance(point, end),
+            None => Vec3::ZERO,
+        };
+        let points = self.punctual.iter().map(arriving).sum();
         (sum * self.scale(), points)
     }
 
@@ -334,17 +179,16 @@ struct Tally {
 }
 
 impl Tally {
-    #[allow(clippy::too_many_arguments)]
     fn cast(
         &mut self,
-        around: (&SceneBvh, &Optics),
+        optics: &Optics,
         emitter: &Emitter,
         pieces: &[Piece],
-        point: DVec3,
-        normal: DVec3,
+        from: ShadingPoint,
         side: u32,
         random: &mut Random,
     ) {
+        let ShadingPoint { position: point, normal } = from;
         let count = side * side;
         // Far emitters are one piece with a grid of strata; near ones are many, and take rays by what they contribute.
         let total: f64 = pieces.iter().map(|piece| piece.factor).sum();
@@ -365,37 +209,30 @@ impl Tally {
             }
             let above = (point - emitter.corners[0]).dot(emitter.normal) >= 0.0;
             let lit_side = if above { emitter.normal } else { -emitter.normal };
-            let (mut at, mut weights) = emitter.within(&pieces[piece], u, v);
-            let mut weight = point_to_element(point, normal, at, lit_side, 1.0);
+            let mut at = emitter.within(&pieces[piece], u, v);
+            let mut weight = point_to_element(point, normal, at.position, lit_side, 1.0);
             // What lies below the horizon is drawn anew: few rays must not all be spent on what gives no light.
             for _ in 0..MOST_REDRAWS {
                 if weight > 0.0 {
                     break;
                 }
-                (at, weights) = emitter.within(&pieces[piece], random.uniform(), random.uniform());
-                weight = point_to_element(point, normal, at, lit_side, 1.0);
+                at = emitter.within(&pieces[piece], random.uniform(), random.uniform());
+                weight = point_to_element(point, normal, at.position, lit_side, 1.0);
             }
             if weight > 0.0 {
-                self.shoot(around, emitter, point, at, weights, if pieces.len() > 1 { 1.0 } else { weight });
+                self.shoot(optics, emitter, point, at, if pieces.len() > 1 { 1.0 } else { weight });
             }
         }
     }
 
-    fn shoot(
-        &mut self,
-        (bvh, optics): (&SceneBvh, &Optics),
-        emitter: &Emitter,
-        point: DVec3,
-        at: DVec3,
-        weights: [f64; 2],
-        weight: f64,
-    ) {
-        let lift = emitter.normal * bvh.offset().copysign((point - at).dot(emitter.normal));
+    fn shoot(&mut self, optics: &Optics, emitter: &Emitter, point: DVec3, to: EmitterPoint, weight: f64) {
+        let at = to.position;
+        let lift = emitter.normal * optics.bvh.offset().copysign((point - at).dot(emitter.normal));
         self.weight += weight;
-        let left = optics.transmittance(bvh, point, at + lift);
+        let left = optics.transmittance(point, at + lift);
         if left.max_element() > 0.0 {
             self.clear += weight;
-            self.light += left * emitter.radiance(bvh.scene(), weights, at) * weight as f32;
+            self.light += left * emitter.radiance(optics.scene(), to) * weight as f32;
         }
     }
 
@@ -409,21 +246,10 @@ impl Tally {
     }
 }
 
-fn punctual(bvh: &SceneBvh, optics: &Optics, light: &PunctualLight, point: DVec3, normal: DVec3) -> Vec3 {
-    match punctual_light(bvh, light, point, normal) {
-        Some((strength, end)) => strength * optics.transmittance(bvh, point, end),
-        None => Vec3::ZERO,
-    }
-}
-
 /// Irradiance over π that a punctual light would give if nothing stood in the way, and where its light comes from [m]: a
 /// point beyond the scene for a directional one. `None` where it gives none.
-pub(crate) fn punctual_light(
-    bvh: &SceneBvh,
-    light: &PunctualLight,
-    point: DVec3,
-    normal: DVec3,
-) -> Option<(Vec3, DVec3)> {
+pub(crate) fn punctual_light(scene: &Scene, light: &PunctualLight, at: ShadingPoint) -> Option<(Vec3, DVec3)> {
+    let ShadingPoint { position: point, normal } = at;
     let (towards, distance, strength) = match light.kind {
         LightKind::Directional => (-light.direction.as_dvec3(), f64::INFINITY, 1.0),
         LightKind::Point | LightKind::Spot { .. } => {
@@ -451,7 +277,7 @@ pub(crate) fn punctual_light(
     let end = if distance.is_finite() {
         light.position.as_dvec3()
     } else {
-        let size = bvh.scene().bounds().map_or(0.0, |(low, high)| (high - low).length());
+        let size = scene.bounds().map_or(0.0, |(low, high)| (high - low).length());
         point + towards * (2.0 * size)
     };
     Some((light.intensity * (strength * cosine * FRAC_1_PI) as f32, end))

@@ -2,7 +2,8 @@
 
 use super::elements::NONE;
 use super::form_factor::clip;
-use super::surface::MIRROR_ALPHA;
+use super::reflection::MIRROR_ALPHA;
+use super::sampling::tangents;
 use crate::scene::{AlphaMode, Material, Scene};
 use glam::DVec3;
 
@@ -135,7 +136,7 @@ pub(crate) fn polygon_area(polygon: &[DVec3]) -> f64 {
 
 /// Convex hull of points in a plane, counter-clockwise round `normal`, without corners on straight edges (Andrew 1979).
 fn hull(points: Vec<DVec3>, normal: DVec3) -> Vec<DVec3> {
-    let (x, y) = super::sampling::tangents(normal);
+    let (x, y) = tangents(normal);
     let mut flat: Vec<(f64, f64, DVec3)> = points.into_iter().map(|p| (p.dot(x), p.dot(y), p)).collect();
     flat.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let size = flat.last().map_or(0.0, |last| last.0 - flat[0].0).max(1e-300);

@@ -27,7 +27,7 @@ impl Named for FormFactor {
 
 impl FormFactor {
     /// The factor by which a transfer differs from Lambert's.
-    pub fn scale(self) -> f64 {
+    pub(crate) fn scale(self) -> f64 {
         match self {
             Self::Lambert => 1.0,
             Self::Paper => 0.5,
@@ -40,7 +40,7 @@ impl FormFactor {
 ///
 /// Lambert's formula (1760): F = (1/2π) |Σ_i γ_i n·(r_i × r_{i+1})/|r_i × r_{i+1}||, γ_i the angle under which edge i
 /// is seen. Exact for every planar polygon that does not contain the point; zero for fewer than three corners.
-pub fn point_to_polygon(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
+pub(crate) fn point_to_polygon(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     let heights = |p: &DVec3| (*p - point).dot(normal);
     if polygon.iter().all(|p| heights(p) >= 0.0) {
         return edge_sum(normal, polygon.iter().map(|p| *p - point));
@@ -89,7 +89,8 @@ fn edge_sum(normal: DVec3, spokes: impl Iterator<Item = DVec3> + Clone) -> f64 {
 ///
 /// An oracle for tests, not for scenes: obstacles are ignored; the error falls with cells⁻³ or faster where the
 /// polygons touch, and with cells⁻⁸ where they do not.
-pub fn polygon_to_polygon(from: &[DVec3], to: &[DVec3], cells: usize) -> f64 {
+#[cfg(test)]
+pub(crate) fn polygon_to_polygon(from: &[DVec3], to: &[DVec3], cells: usize) -> f64 {
     const NODES: [(f64, f64); 4] = [
         (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
         (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
@@ -120,7 +121,7 @@ pub fn polygon_to_polygon(from: &[DVec3], to: &[DVec3], cells: usize) -> f64 {
 }
 
 /// Form factor from a surface element to a small area: cosθ₁cosθ₂·area/(π r²) [1], zero where either looks away.
-pub fn point_to_element(point: DVec3, normal: DVec3, at: DVec3, facing: DVec3, area: f64) -> f64 {
+pub(crate) fn point_to_element(point: DVec3, normal: DVec3, at: DVec3, facing: DVec3, area: f64) -> f64 {
     let span = at - point;
     let squared = span.length_squared();
     let (here, there) = (normal.dot(span), -facing.dot(span));

@@ -11,42 +11,64 @@
 //!
 //! Radiance of a Lambertian surface is ρE/π; "irradiance" in this module's tables is E/π, so that a white surface shows
 //! it unchanged.
+//!
+//! ```
+//! use holodrive::illumination::{Illumination, IlluminationSettings};
+//! use holodrive::progress::Progress;
+//! use holodrive::scene::{SceneBvh, gltf};
+//!
+//! let room = gltf::load("scenes/cornell.gltf".as_ref(), &gltf::LoadOptions::default())?.scene;
+//! let settings = IlluminationSettings::default().coarse();
+//! let light = Illumination::new(SceneBvh::new(room), settings, &Progress::new())?;
+//! // All that the lamp emits is absorbed by the walls, or leaves through the open side.
+//! assert!(light.report().energy.imbalance().abs() < 0.02);
+//! # Ok::<(), holodrive::Error>(())
+//! ```
 
 #[cfg(test)]
 mod caustic_tests;
 mod caustics;
 mod elements;
+mod emitter;
 mod emitters;
 mod flat_mirrors;
-pub mod form_factor;
+mod form_factor;
 mod images;
-pub mod oracle;
+#[cfg(test)]
+mod images_tests;
+mod lamp_image;
+mod meshing;
+#[cfg(test)]
+pub(crate) mod oracle;
 mod patches;
-pub mod paths;
+pub(crate) mod paths;
 mod photons;
 mod radiosity;
+pub(crate) mod reflection;
 #[cfg(test)]
 pub(crate) mod rooms;
 mod sampling;
 mod shading;
 mod shaft;
-pub mod surface;
+mod surface;
 #[cfg(test)]
 mod tests;
 
 pub use form_factor::FormFactor;
 pub use radiosity::Convergence;
-pub use surface::Surface;
+pub(crate) use surface::Surface;
 
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::random::Random;
 use crate::scene::bvh::SceneBvh;
 use caustics::Caustics;
-use elements::{Elements, Fineness, Senders};
+use elements::{Elements, Senders};
 use emitters::{Clear, Emitters};
 use glam::Vec3;
-use images::{Around, Images};
+use images::Images;
+use lamp_image::Lamps;
+use meshing::Fineness;
 use patches::Patches;
 use paths::Optics;
 use radiosity::{Surroundings, Transport};
@@ -170,7 +192,6 @@ const MOST_PLACES: usize = 400;
 
 /// A lit scene.
 pub struct Illumination {
-    bvh: Arc<SceneBvh>,
     settings: IlluminationSettings,
     emitters: Emitters,
     mesh: Elements,
@@ -191,16 +212,15 @@ impl Illumination {
     /// Lights a scene.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a setting outside its domain, [`Error::Interrupted`] when asked to stop.
+    /// [`Error::OutOfRange`] for a setting outside its domain, [`Error::Interrupted`] when asked to stop.
     pub fn new(bvh: impl Into<Arc<SceneBvh>>, settings: IlluminationSettings, progress: &Progress) -> Result<Self> {
         settings.check()?;
-        let owned = bvh.into();
-        let bvh = &*owned;
+        let bvh = bvh.into();
         let begin = Instant::now();
         let scene = bvh.scene();
         let emitters = Emitters::new(scene, settings.form_factor);
-        let lamps = emitters.polygons.len() + scene.lights.len();
-        let optics = Optics::new(scene, settings.bounces, Images::most_mirrors(lamps));
+        let count = emitters.polygons.len() + scene.lights.len();
+        let optics = Optics::new(bvh.clone(), settings.bounces, Images::most_mirrors(count));
         let diagonal = scene.bounds().map_or(0.0, |(low, high)| (high - low).length());
         let fineness = Fineness {
             longest: settings.longest_element * diagonal,
@@ -209,30 +229,30 @@ impl Illumination {
             most_vertices: settings.most_vertices,
         };
         progress.start("meshing surfaces", 0);
-        let mesh = Elements::new(bvh, fineness, settings.seed ^ 0xe1e, |triangle, front| {
+        let mesh = Elements::new(&bvh, fineness, settings.seed ^ 0xe1e, |triangle, front| {
             let material = scene.material(triangle);
             let weak = material.emissive.max_element() > 0.0 && !emitters.sampled[triangle as usize];
             (front || material.double_sided) && !material.unlit && (may_scatter(material) || weak)
         });
         let senders = mesh.senders();
         progress.check()?;
-        let around = Around { bvh, optics: &optics, emitters: &emitters };
-        let images = Images::new(around, &mesh.some_places(MOST_PLACES, bvh.offset()));
-        let weak = weak_light(around, &images, &mesh, settings.seed ^ 0x3ea7, progress)?;
-        let clear = clear_views(around, &mesh);
-        let mut patches = Patches::new(around, &images, &mesh, &senders, &clear, &settings, progress)?;
+        let lamps = Lamps { optics: &optics, emitters: &emitters };
+        let images = Images::new(lamps, &mesh.some_places(MOST_PLACES, bvh.offset()));
+        let weak = weak_light(lamps, &images, &mesh, settings.seed ^ 0x3ea7, progress)?;
+        let clear = clear_views(lamps, &mesh);
+        let mut patches = Patches::new(lamps, &images, &mesh, &senders, &clear, &settings, progress)?;
         for (direct, &sender) in patches.direct.iter_mut().zip(&senders.all) {
             *direct += mesh.mean_over(sender, &weak);
         }
         // Where nothing scatters no photon can end.
         let count = if mesh.vertices.is_empty() { 0 } else { settings.photons };
-        let photons = photons::shoot(around, count, settings.seed ^ 0xf070, progress)?;
-        patches.receive(bvh, &mesh, &senders, &photons);
-        let caustics = Caustics::new(bvh, &photons);
+        let photons = photons::shoot(lamps, count, settings.seed ^ 0xf070, progress)?;
+        patches.receive(&bvh, &mesh, &senders, &photons);
+        let caustics = Caustics::new(&bvh, &photons);
         progress.check()?;
         let most = (MOST_GATHERING_RAYS / mesh.vertices.len().max(1)) as f64;
         let side = f64::from(settings.indirect_rays).min(most).sqrt().floor().max(4.0) as usize;
-        let surroundings = Surroundings { bvh, mesh: &mesh, senders: &senders, optics: &optics };
+        let surroundings = Surroundings { mesh: &mesh, senders: &senders, optics: &optics };
         let transport = Transport::cast(&surroundings, side, settings.seed ^ 0x6a7, progress)?;
         let scale = settings.form_factor.scale() as f32;
         let source: Vec<Vec3> =
@@ -248,7 +268,6 @@ impl Illumination {
         let energy = patches.energy(&surroundings, &emitters, &transport, &leaving, &irradiance, settings.seed);
         let irradiance = irradiance.iter().zip(&weak).map(|(i, w)| *i + *w).collect();
         let mut light = Self {
-            bvh: owned,
             settings,
             emitters,
             mesh,
@@ -282,7 +301,7 @@ impl Illumination {
 
     /// The ray caster that the light was computed with.
     pub fn bvh(&self) -> &Arc<SceneBvh> {
-        &self.bvh
+        &self.optics.bvh
     }
 
     /// Whether nothing shines at all: neither a sampled emitter, nor a weak one, nor a punctual light.
@@ -291,32 +310,32 @@ impl Illumination {
     }
 
     fn surroundings(&self) -> Surroundings<'_> {
-        Surroundings { bvh: &self.bvh, mesh: &self.mesh, senders: &self.senders, optics: &self.optics }
+        Surroundings { mesh: &self.mesh, senders: &self.senders, optics: &self.optics }
     }
 
-    fn around(&self) -> Around<'_> {
-        Around { bvh: &self.bvh, optics: &self.optics, emitters: &self.emitters }
+    fn lamps(&self) -> Lamps<'_> {
+        Lamps { optics: &self.optics, emitters: &self.emitters }
     }
 }
 
 /// Which emitters each leaf of the mesh sees whole.
-fn clear_views(around: Around, mesh: &Elements) -> Vec<Clear> {
+fn clear_views(lamps: Lamps, mesh: &Elements) -> Vec<Clear> {
     let each = mesh.elements.par_iter().enumerate().map(|(index, element)| {
         let facing = mesh.facing(element.triangle, element.front);
         let leaf = mesh.is_leaf(index as u32);
-        if leaf { around.emitters.clear(around.bvh, &mesh.corners(index), facing) } else { 0 }
+        if leaf { lamps.emitters.clear(&lamps.optics.bvh, &mesh.corners(index), facing) } else { 0 }
     });
     each.collect()
 }
 
 /// Light of weak images at the vertices: irradiance over π.
-fn weak_light(around: Around, images: &Images, mesh: &Elements, seed: u64, progress: &Progress) -> Result<Vec<Vec3>> {
-    let offset = around.bvh.offset();
+fn weak_light(lamps: Lamps, images: &Images, mesh: &Elements, seed: u64, progress: &Progress) -> Result<Vec<Vec3>> {
+    let offset = lamps.optics.bvh.offset();
     let found = mesh.vertices.par_iter().enumerate().map(|(index, vertex)| {
         if vertex.buried || progress.stopped() {
             return Vec3::ZERO;
         }
-        images.weak(around, vertex.origin(offset), vertex.normal, &mut Random::new(seed, index as u64))
+        images.weak(lamps, vertex.shading_point(offset), &mut Random::new(seed, index as u64))
     });
     let found = found.collect();
     progress.check()?;
@@ -325,7 +344,7 @@ fn weak_light(around: Around, images: &Images, mesh: &Elements, seed: u64, progr
 
 fn may_scatter(material: &crate::scene::Material) -> bool {
     let metal = material.metallic >= 1.0
-        && material.roughness < surface::WIDE_LOBE
+        && material.roughness < reflection::WIDE_LOBE
         && material.metallic_roughness_texture.is_none();
     material.base_color.max_element() > 0.0 && !metal && material.transmission < 1.0
 }
@@ -336,21 +355,21 @@ impl IlluminationSettings {
             if value >= low && value <= high {
                 Ok(())
             } else {
-                Err(Error::parameter(name, format!("{value} is outside [{low}, {high}]")))
+                Err(Error::out_of_range(name, value, format!("must be {low} to {high}")))
             }
         };
         within("residual", self.residual, 1e-7, 1.0)?;
-        within("longest-element", self.longest_element, 1e-4, 1.0)?;
-        within("shortest-element", self.shortest_element, 1e-5, self.longest_element)?;
+        within("longest element", self.longest_element, 1e-4, 1.0)?;
+        within("shortest element", self.shortest_element, 1e-5, self.longest_element)?;
         within("nearness", self.nearness, 0.01, 100.0)?;
-        within("shadow-rays", f64::from(self.shadow_rays), 1.0, 1e6)?;
-        within("penumbra-rays", f64::from(self.penumbra_rays), 0.0, 1e6)?;
-        within("indirect-rays", f64::from(self.indirect_rays), 16.0, 1e6)?;
+        within("shadow rays", f64::from(self.shadow_rays), 1.0, 1e6)?;
+        within("penumbra rays", f64::from(self.penumbra_rays), 0.0, 1e6)?;
+        within("indirect rays", f64::from(self.indirect_rays), 16.0, 1e6)?;
         // Their table takes some 100 bytes each.
         within("photons", f64::from(self.photons), 0.0, 2e7)?;
         within("bounces", f64::from(self.bounces), 0.0, 1000.0)?;
         if let Some(rays) = self.final_gather {
-            within("final-gather", f64::from(rays), 1.0, 1e6)?;
+            within("final gather", f64::from(rays), 1.0, 1e6)?;
         }
         Ok(())
     }

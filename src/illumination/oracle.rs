@@ -18,33 +18,31 @@ const SURE: u32 = 4;
 const MOST: u32 = 1000;
 
 /// A plain path tracer.
-pub struct Oracle {
-    bvh: Arc<SceneBvh>,
+pub(crate) struct Oracle {
     optics: Optics,
 }
 
 impl Oracle {
     /// For a scene without punctual lights: no path meets those by chance.
-    pub fn new(bvh: impl Into<Arc<SceneBvh>>) -> Self {
-        let bvh = bvh.into();
-        Self { optics: Optics::new(bvh.scene(), MOST, 0), bvh }
+    pub(crate) fn new(bvh: Arc<SceneBvh>) -> Self {
+        Self { optics: Optics::new(bvh, MOST, 0) }
     }
 
     /// Radiance that one path finds along an eye's ray [W/(m² sr)]: its mean over many is the truth.
-    pub fn radiance(&self, ray: Ray, random: &mut Random) -> Vec3 {
+    pub(crate) fn radiance(&self, ray: Ray, random: &mut Random) -> Vec3 {
         let (mut ray, mut weight, mut sum, mut sides) = (ray, Vec3::ONE, Vec3::ZERO, Sides::Front);
         for surface_number in 0..MOST {
-            let Some(meeting) = self.bvh.meet(&ray, 0.0, f64::INFINITY, sides) else { break };
+            let Some(meeting) = self.optics.bvh.meet(&ray, 0.0, f64::INFINITY, sides) else { break };
             sides = Sides::Both;
-            let hit = self.bvh.refined(&ray, &meeting);
-            let surface = Surface::at(self.bvh.scene(), &hit, 0.0);
-            let material = self.bvh.scene().material(hit.triangle);
+            let hit = self.optics.bvh.refined(&ray, &meeting);
+            let surface = Surface::at(self.optics.scene(), &hit, 0.0);
+            let material = self.optics.scene().material(hit.triangle);
             if !hit.front && !material.double_sided && material.transmission <= 0.0 {
                 break;
             }
             sum += weight * surface.emission * surface.coverage;
             let way = match self.optics.optical[hit.triangle as usize] {
-                true => self.optics.next(&self.bvh, &ray, &meeting, random),
+                true => self.optics.next(&ray, &meeting, random),
                 false => Continuation::Diffuse(Vec3::ONE),
             };
             match way {
@@ -60,7 +58,7 @@ impl Oracle {
                     if direction.dot(surface.facing) <= 0.0 {
                         break;
                     }
-                    ray = Ray { origin: surface.position + surface.facing * self.bvh.offset(), direction };
+                    ray = Ray { origin: surface.position + surface.facing * self.optics.bvh.offset(), direction };
                 }
             }
             let strength = weight.max_element().min(1.0);

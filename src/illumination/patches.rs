@@ -3,9 +3,10 @@
 use super::IlluminationSettings;
 use super::elements::{Elements, Senders};
 use super::emitters::{Clear, Emitters, ShadowRays};
-use super::images::{Around, Images};
+use super::images::Images;
+use super::lamp_image::Lamps;
 use super::photons::Photon;
-use super::radiosity::{End, Surroundings, Transport};
+use super::radiosity::{RayEnd, Surroundings, Transport};
 use super::surface::Surface;
 use super::{Energy, sampling};
 use crate::error::Result;
@@ -28,9 +29,8 @@ pub(crate) struct Patches {
 
 impl Patches {
     /// Reads materials and samples direct light at a few places of each sender.
-    #[allow(clippy::too_many_arguments)]
     pub(crate) fn new(
-        around: Around,
+        lamps: Lamps,
         images: &Images,
         mesh: &Elements,
         senders: &Senders,
@@ -38,7 +38,8 @@ impl Patches {
         settings: &IlluminationSettings,
         progress: &Progress,
     ) -> Result<Self> {
-        let Around { bvh, optics, emitters } = around;
+        let Lamps { optics, emitters } = lamps;
+        let bvh = &optics.bvh;
         progress.start("direct light on patches", senders.all.len() as u64);
         let found: Vec<[Vec3; 5]> = senders
             .all
@@ -67,10 +68,10 @@ impl Patches {
                     let hit =
                         Hit { triangle: element.triangle, distance: 0.0, position, barycentric, front: element.front };
                     let surface = Surface::at(bvh.scene(), &hit, (area / places.len() as f64).sqrt());
-                    let point = position + surface.facing * bvh.offset();
-                    let (lamps, points) = emitters.light_apart(bvh, optics, point, surface.normal, rays, &mut random);
+                    let at = surface.shading_point(bvh.offset());
+                    let (areas, points) = emitters.light(optics, at, rays, &mut random);
                     sums[0] += surface.albedo;
-                    sums[1] += lamps + points + images.strong(around, point, surface.normal, rays, &mut random);
+                    sums[1] += areas + points + images.strong(lamps, at, rays, &mut random);
                     sums[2] += points;
                     if !emitters.sampled[element.triangle as usize] {
                         sums[3] += surface.emission;
@@ -112,7 +113,7 @@ impl Patches {
         irradiance: &[Vec3],
         seed: u64,
     ) -> Energy {
-        let (mesh, bvh) = (around.mesh, around.bvh);
+        let (mesh, bvh) = (around.mesh, &around.optics.bvh);
         let mut sums = [[0.0f64; 3]; 3];
         let mut add = |which: usize, flux: Vec3| {
             for (sum, part) in sums[which].iter_mut().zip(flux.to_array()) {
@@ -138,20 +139,20 @@ impl Patches {
             let mut random = Random::new(seed ^ 0xe4e, index as u64);
             let (mut escaped, mut black) = (Vec3::ZERO, Vec3::ZERO);
             for cell in 0..side * side {
-                let (point, _) = emitter.point(random.uniform(), random.uniform());
-                let up = !emitter.is_two_sided() || cell % 2 == 0;
-                let normal = if up { emitter.normal() } else { -emitter.normal() };
+                let point = emitter.point(random.uniform(), random.uniform());
+                let up = !emitter.two_sided || cell % 2 == 0;
+                let normal = if up { emitter.normal } else { -emitter.normal };
                 let direction = sampling::hemisphere(normal, 1, &mut random).next().unwrap_or(normal);
                 random = Random::new(random.bits(), u64::from(cell));
-                let ray = Ray { origin: point + normal * bvh.offset(), direction };
+                let ray = Ray { origin: point.position + normal * bvh.offset(), direction };
                 match around.follow(ray, &mut random) {
-                    (End::Escaped, tint) => {
+                    (RayEnd::Escaped, tint) => {
                         escaped += tint;
                         black += Vec3::ONE - tint;
                     }
-                    (End::Black, _) => black += Vec3::ONE,
+                    (RayEnd::Black, _) => black += Vec3::ONE,
                     // What optics took on the way to a surface.
-                    (End::Sender(_), tint) => black += Vec3::ONE - tint,
+                    (RayEnd::Sender(_), tint) => black += Vec3::ONE - tint,
                 }
             }
             let flux = emitter.flux() / (side * side) as f32;

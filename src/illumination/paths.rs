@@ -1,69 +1,13 @@
 //! How a ray goes on at mirrors, glossy metals and glass.
 
 use super::flat_mirrors::FlatMirrors;
-use super::sampling::tangents;
-use super::surface::{MIRROR_ALPHA, Surface, WIDE_LOBE};
+use super::reflection::{MIRROR_ALPHA, WIDE_LOBE, dielectric_reflectance, ggx_half, ggx_weight, reflected, refracted};
+use super::surface::Surface;
 use crate::random::Random;
-use crate::scene::bvh::{Meeting, Ray, SceneBvh, Sides};
+use crate::scene::bvh::{Hit, Meeting, Ray, SceneBvh, Sides};
 use crate::scene::{AlphaMode, Material, Scene};
 use glam::{DVec3, Vec3};
-
-/// Direction of a mirrored ray.
-pub fn reflected(direction: DVec3, normal: DVec3) -> DVec3 {
-    direction - normal * (2.0 * direction.dot(normal))
-}
-
-/// Direction of a refracted ray (Snell); `normal` looks against the ray, `ratio` is n₁/n₂. `None` at total reflection.
-pub fn refracted(direction: DVec3, normal: DVec3, ratio: f64) -> Option<DVec3> {
-    let cosine = -direction.dot(normal);
-    let squared = 1.0 - ratio * ratio * (1.0 - cosine * cosine);
-    (squared >= 0.0).then(|| (direction * ratio + normal * (ratio * cosine - squared.sqrt())).normalize())
-}
-
-/// Fresnel's reflectance of a dielectric for unpolarised light; `ratio` is n₁/n₂, `cosine` that of incidence. One at
-/// total reflection.
-pub fn dielectric_reflectance(cosine: f64, ratio: f64) -> f64 {
-    let squared = 1.0 - ratio * ratio * (1.0 - cosine * cosine);
-    if squared <= 0.0 {
-        return 1.0;
-    }
-    let through = squared.sqrt();
-    let s = (ratio * cosine - through) / (ratio * cosine + through);
-    let p = (cosine - ratio * through) / (cosine + ratio * through);
-    0.5 * (s * s + p * p)
-}
-
-/// A half vector of the GGX distribution as seen from `view` (Heitz 2018), in world space.
-pub(crate) fn ggx_half(view: DVec3, normal: DVec3, alpha: f64, random: &mut Random) -> DVec3 {
-    let (x, y) = tangents(normal);
-    let local = DVec3::new(view.dot(x) * alpha, view.dot(y) * alpha, view.dot(normal)).normalize();
-    let (t1, t2) = tangents(local);
-    let radius = random.uniform().sqrt();
-    let (sin, cos) = random.phase().sin_cos();
-    let a = radius * cos;
-    let blend = 0.5 * (1.0 + local.z);
-    // Measured from the frame's own axes, so that the projected half disk lies on the side of the normal.
-    let (t1, t2) = if local.z < 1.0 - 1e-9 {
-        let t1 = DVec3::Z.cross(local).normalize();
-        (t1, local.cross(t1))
-    } else {
-        (t1, t2)
-    };
-    let b = (1.0 - blend) * (1.0 - a * a).max(0.0).sqrt() + blend * radius * sin;
-    let h = t1 * a + t2 * b + local * (1.0 - a * a - b * b).max(0.0).sqrt();
-    (x * (h.x * alpha) + y * (h.y * alpha) + normal * h.z.max(0.0)).normalize_or(normal)
-}
-
-/// Weight of a direction that was drawn through [`ggx_half`]: Smith's height-correlated G₂ over G₁ (Heitz 2014), for
-/// the cosines of the directions to the viewer and to the light with the normal.
-pub(crate) fn ggx_weight(view: f64, light: f64, alpha: f64) -> f64 {
-    let lambda = |cosine: f64| {
-        let squared = (cosine * cosine).max(1e-12);
-        0.5 * ((1.0 + alpha * alpha * (1.0 - squared) / squared).sqrt() - 1.0)
-    };
-    let (v, l) = (lambda(view), lambda(light));
-    (1.0 + v) / (1.0 + v + l)
-}
+use std::sync::Arc;
 
 /// In which way a ray has left a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,9 +31,9 @@ pub(crate) enum Continuation {
     Absorbed,
 }
 
-/// Which surfaces are more than diffuse.
-#[derive(Clone, Debug)]
+/// A scene for rays, and which of its surfaces are more than diffuse.
 pub(crate) struct Optics {
+    pub(crate) bvh: Arc<SceneBvh>,
     /// Per triangle: whether its material reflects, transmits or is passed in part.
     pub(crate) optical: Vec<bool>,
     /// Per triangle: whether light passes it straight on, in part.
@@ -104,24 +48,29 @@ pub(crate) struct Optics {
 
 impl Optics {
     /// For paths over at most `bounces` surfaces, with at most `most_mirrors` flat mirrors set apart.
-    pub(crate) fn new(scene: &Scene, bounces: u32, most_mirrors: usize) -> Self {
+    pub(crate) fn new(bvh: Arc<SceneBvh>, bounces: u32, most_mirrors: usize) -> Self {
+        let scene = bvh.scene();
         let optical: Vec<bool> = scene.materials.iter().map(is_optical).collect();
         let passes: Vec<bool> = scene.materials.iter().map(is_passed).collect();
         let each = |of: &[bool]| -> Vec<bool> { scene.triangles.iter().map(|t| of[t.material as usize]).collect() };
         let (optical, passes) = (each(&optical), each(&passes));
         let mirrors = FlatMirrors::new(scene, most_mirrors);
-        Self { any_passes: passes.contains(&true), optical, passes, mirrors, bounces: bounces + 1 }
+        Self { any_passes: passes.contains(&true), optical, passes, mirrors, bounces: bounces + 1, bvh }
+    }
+
+    pub(crate) fn scene(&self) -> &Scene {
+        self.bvh.scene()
     }
 
     /// What thin walls and half-covered surfaces leave of light between two points that are lifted off their surfaces;
     /// zero where something solid stands between.
-    pub(crate) fn transmittance(&self, bvh: &SceneBvh, from: DVec3, to: DVec3) -> Vec3 {
+    pub(crate) fn transmittance(&self, from: DVec3, to: DVec3) -> Vec3 {
         if !self.any_passes {
-            return if bvh.occluded(from, to) { Vec3::ZERO } else { Vec3::ONE };
+            return if self.bvh.occluded(from, to) { Vec3::ZERO } else { Vec3::ONE };
         }
         let length = (to - from).length();
         let ray = Ray { origin: from, direction: (to - from) / length };
-        match self.solid(bvh, ray, length) {
+        match self.solid(ray, length) {
             (None, tint) => tint,
             (Some(_), _) => Vec3::ZERO,
         }
@@ -129,7 +78,8 @@ impl Optics {
 
     /// The first surface along a ray before `length` [m] that is not passed straight on, with the ray that starts behind
     /// the last passed one, and what the passed ones have left of the light.
-    pub(crate) fn solid(&self, bvh: &SceneBvh, ray: Ray, length: f64) -> (Option<(Meeting, Ray)>, Vec3) {
+    pub(crate) fn solid(&self, ray: Ray, length: f64) -> (Option<(Meeting, Ray)>, Vec3) {
+        let bvh = &self.bvh;
         let (mut ray, mut left, mut tint) = (ray, length, Vec3::ONE);
         for _ in 0..=self.bounces {
             let Some(meeting) = bvh.meet(&ray, 0.0, left, Sides::Both) else { return (None, tint) };
@@ -152,8 +102,8 @@ impl Optics {
     }
 
     /// Chooses one way on, with a probability in proportion to its strength.
-    pub(crate) fn next(&self, bvh: &SceneBvh, ray: &Ray, meeting: &Meeting, random: &mut Random) -> Continuation {
-        let scene = bvh.scene();
+    pub(crate) fn next(&self, ray: &Ray, meeting: &Meeting, random: &mut Random) -> Continuation {
+        let (bvh, scene) = (&self.bvh, self.scene());
         let hit = bvh.refined(ray, meeting);
         let material = scene.material(meeting.triangle);
         if !hit.front && !material.double_sided && material.transmission <= 0.0 {
@@ -189,7 +139,7 @@ impl Optics {
 }
 
 /// What absorption in the body that a ray comes from leaves of its light.
-pub(crate) fn inside(material: &Material, hit: &crate::scene::Hit, distance: f64) -> Vec3 {
+pub(crate) fn inside(material: &Material, hit: &Hit, distance: f64) -> Vec3 {
     let absorbing =
         material.thickness > 0.0 && material.transmission > 0.0 && material.attenuation_distance.is_finite();
     if hit.front || !absorbing {
@@ -264,58 +214,4 @@ fn is_optical(material: &Material) -> bool {
 fn is_passed(material: &Material) -> bool {
     let thin = material.transmission > 0.0 && material.thickness <= 0.0;
     !material.unlit && (thin || matches!(material.alpha_mode, AlphaMode::Blend))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn fresnel_and_snell_at_known_angles() {
-        // Normal incidence on n = 1.5: ((n−1)/(n+1))² = 4 %; Brewster's angle atan(n) leaves half of the s part.
-        assert!((dielectric_reflectance(1.0, 1.0 / 1.5) - 0.04).abs() < 1e-12);
-        let brewster = 1.5f64.atan();
-        let s = ((1.0 - 1.5f64 * 1.5) / (1.0 + 1.5 * 1.5)).powi(2);
-        assert!((dielectric_reflectance(brewster.cos(), 1.0 / 1.5) - 0.5 * s).abs() < 1e-12);
-        assert_eq!(dielectric_reflectance(0.5, 1.5), 1.0);
-        let incident = DVec3::new(0.6, 0.0, -0.8);
-        let through = refracted(incident, DVec3::Z, 1.0 / 1.5).unwrap();
-        assert!((through.x - 0.4).abs() < 1e-12 && through.z < 0.0);
-        assert!(refracted(incident, DVec3::Z, 2.0).is_none());
-        assert!((reflected(incident, DVec3::Z) - DVec3::new(0.6, 0.0, 0.8)).length() < 1e-12);
-    }
-
-    #[test]
-    fn rough_reflection_is_drawn_as_the_microfacet_model_says() {
-        // White GGX: the mean weight must be the integral of D·G₂/(4 cosθᵥ) over the hemisphere, here by quadrature.
-        let view = DVec3::new(0.5, 0.0, 0.75f64.sqrt());
-        for alpha in [0.05f64, 0.2, 0.4] {
-            let (mut integral, n) = (0.0, 1500);
-            for i in 0..n {
-                for j in 0..n {
-                    let cos = (f64::from(i) + 0.5) / f64::from(n);
-                    let (s, c) = (std::f64::consts::TAU * (f64::from(j) + 0.5) / f64::from(n)).sin_cos();
-                    let sin = (1.0 - cos * cos).sqrt();
-                    let light = DVec3::new(sin * c, sin * s, cos);
-                    let z2 = (view + light).normalize().z.powi(2);
-                    let d = alpha * alpha / (std::f64::consts::PI * (z2 * (alpha * alpha - 1.0) + 1.0).powi(2));
-                    let lambda = |z: f64| 0.5 * ((1.0 + alpha * alpha * (1.0 - z * z) / (z * z)).sqrt() - 1.0);
-                    let g = 1.0 / (1.0 + lambda(view.z) + lambda(cos));
-                    integral += d * g / (4.0 * view.z) * std::f64::consts::TAU / f64::from(n * n);
-                }
-            }
-            let mut random = Random::new(1, 0);
-            let draws = 40_000;
-            let drawn: f64 = (0..draws)
-                .map(|_| {
-                    let out = reflected(-view, ggx_half(view, DVec3::Z, alpha, &mut random));
-                    if out.z > 0.0 { ggx_weight(view.z, out.z, alpha) } else { 0.0 }
-                })
-                .sum::<f64>()
-                / f64::from(draws);
-            // Weights lie in [0, 1]: standard deviation of the mean below 0.5/200.
-            assert!((drawn - integral).abs() < 1e-2, "α = {alpha}: {drawn}, not {integral}");
-            assert!(drawn <= 1.0);
-        }
-    }
 }

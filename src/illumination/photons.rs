@@ -9,10 +9,12 @@
 //! of nothing but flat mirrors (`images`).
 
 use super::elements::NONE;
-use super::emitters::{Emitter, punctual_light};
-use super::images::Around;
-use super::paths::{Continuation, Way};
+use super::emitter::Emitter;
+use super::emitters::punctual_light;
+use super::lamp_image::Lamps;
+use super::paths::{Continuation, Optics, Way};
 use super::sampling::triangle_weights;
+use super::surface::ShadingPoint;
 use crate::error::Result;
 use crate::progress::Progress;
 use crate::random::Random;
@@ -60,13 +62,13 @@ struct Target {
 ///
 /// # Errors
 /// [`crate::error::Error::Interrupted`] when asked to stop.
-pub(crate) fn shoot(around: Around, count: u32, seed: u64, progress: &Progress) -> Result<Vec<Photon>> {
-    let scene = around.bvh.scene();
+pub(crate) fn shoot(lit: Lamps, count: u32, seed: u64, progress: &Progress) -> Result<Vec<Photon>> {
+    let scene = lit.optics.scene();
     let targets: Vec<Target> = (0..scene.triangles.len() as u32)
-        .filter(|&t| around.optics.optical[t as usize] && scene.triangles[t as usize].area() > 0.0)
+        .filter(|&t| lit.optics.optical[t as usize] && scene.triangles[t as usize].area() > 0.0)
         .map(|triangle| {
             let shape = &scene.triangles[triangle as usize];
-            let flat = around.optics.mirrors.of[triangle as usize] != NONE;
+            let flat = lit.optics.mirrors.of[triangle as usize] != NONE;
             let part = if flat { FLAT_PART } else { 1.0 };
             Target { triangle, area: shape.area(), middle: shape.at([1.0 / 3.0; 2]), normal: shape.normal(), part }
         })
@@ -75,9 +77,9 @@ pub(crate) fn shoot(around: Around, count: u32, seed: u64, progress: &Progress) 
     if count == 0 || targets.iter().all(|t| t.part < 1.0) {
         return Ok(Vec::new());
     }
-    let polygons = around.emitters.polygons.iter().map(Lamp::Polygon);
+    let polygons = lit.emitters.polygons.iter().map(Lamp::Polygon);
     let lamps: Vec<Lamp> = polygons.chain(scene.lights.iter().map(Lamp::Point)).collect();
-    let chances: Vec<Vec<f64>> = lamps.par_iter().map(|lamp| lamp.chances(around, &targets)).collect();
+    let chances: Vec<Vec<f64>> = lamps.par_iter().map(|lamp| lamp.chances(lit, &targets)).collect();
     let strengths: Vec<f64> = chances.iter().map(|c| c.iter().sum()).collect();
     let total: f64 = strengths.iter().sum();
     if !(total > 0.0 && total.is_finite()) {
@@ -111,8 +113,8 @@ pub(crate) fn shoot(around: Around, count: u32, seed: u64, progress: &Progress) 
                 let chance = chances[k] / strength;
                 let place: [f64; 4] = std::array::from_fn(|d| (shift[d] + shot as f64 * STRIDES[d]).fract());
                 let mut random = Random::new(seed ^ 0x9407 ^ ((number as u64) << 32), shot);
-                let aimed = lamp.aim(around, &targets[k], place)?;
-                follow(around, aimed, 1.0 / (chance * shots as f64), &mut random)
+                let aimed = lamp.aim(lit, &targets[k], place)?;
+                follow(lit.optics, aimed, 1.0 / (chance * shots as f64), &mut random)
             })
             .collect();
         progress.check()?;
@@ -134,22 +136,24 @@ struct Aimed {
 
 impl Lamp<'_> {
     /// How much flux each target gets, about, if nothing stands between.
-    fn chances(&self, around: Around, targets: &[Target]) -> Vec<f64> {
+    fn chances(&self, lit: Lamps, targets: &[Target]) -> Vec<f64> {
         let mut chances: Vec<f64> = targets
             .iter()
             .map(|t| {
                 let light = match self {
                     Self::Polygon(e) => {
-                        let span = t.middle - e.corners().iter().sum::<DVec3>() / e.corners().len() as f64;
+                        let span = t.middle - e.corners.iter().sum::<DVec3>() / e.corners.len() as f64;
                         // Near a lamp the midpoints say little: not nearer than the triangle is large.
                         let squared = span.length_squared().max(t.area);
-                        let leaving = e.normal().dot(span) / squared.sqrt();
-                        let leaving = if e.is_two_sided() { leaving.abs() } else { leaving.max(0.0) };
+                        let leaving = e.normal.dot(span) / squared.sqrt();
+                        let leaving = if e.two_sided { leaving.abs() } else { leaving.max(0.0) };
                         let arriving = t.normal.dot(span).abs() / squared.sqrt();
-                        f64::from(e.mean_radiance().element_sum()) * e.area() * leaving * arriving / squared
+                        f64::from(e.mean_radiance.element_sum()) * e.area * leaving * arriving / squared
                     }
                     Self::Point(light) => {
-                        let towards = |normal| punctual_light(around.bvh, light, t.middle, normal);
+                        let towards = |normal| {
+                            punctual_light(lit.optics.scene(), light, ShadingPoint { position: t.middle, normal })
+                        };
                         let found = towards(t.normal).or_else(|| towards(-t.normal));
                         found.map_or(0.0, |(strength, _)| f64::from(strength.element_sum()))
                     }
@@ -164,30 +168,28 @@ impl Lamp<'_> {
     }
 
     /// Aims at a place of a target; `None` where nothing arrives.
-    fn aim(&self, around: Around, target: &Target, place: [f64; 4]) -> Option<Aimed> {
-        let (bvh, scene) = (around.bvh, around.bvh.scene());
+    fn aim(&self, lit: Lamps, target: &Target, place: [f64; 4]) -> Option<Aimed> {
+        let (bvh, scene) = (&lit.optics.bvh, lit.optics.scene());
         let (v, w) = triangle_weights(place[0], place[1]);
         let at = scene.triangles[target.triangle as usize].at([v, w]);
         let (from, flux) = match self {
             Self::Polygon(e) => {
-                let (from, weights) = e.point(place[2], place[3]);
-                let span = at - from;
-                let leaving = e.normal().dot(span);
-                if leaving <= 0.0 && !e.is_two_sided() {
+                let from = e.point(place[2], place[3]);
+                let span = at - from.position;
+                let leaving = e.normal.dot(span);
+                if leaving <= 0.0 && !e.two_sided {
                     return None;
                 }
                 let squared = span.length_squared();
                 let solid = leaving.abs() * target.normal.dot(span).abs() / (squared * squared);
-                let lift = e.normal() * bvh.offset().copysign(leaving);
+                let lift = e.normal * bvh.offset().copysign(leaving);
                 (
-                    from + lift,
-                    e.radiance(scene, weights, from)
-                        * (solid * e.area() * target.area) as f32
-                        * around.emitters.scale(),
+                    from.position + lift,
+                    e.radiance(scene, from) * (solid * e.area * target.area) as f32 * lit.emitters.scale(),
                 )
             }
             Self::Point(light) => {
-                let towards = |normal| punctual_light(bvh, light, at, normal);
+                let towards = |normal| punctual_light(scene, light, ShadingPoint { position: at, normal });
                 let (strength, end) = towards(target.normal).or_else(|| towards(-target.normal))?;
                 (end, strength * (std::f64::consts::PI * target.area) as f32)
             }
@@ -196,7 +198,7 @@ impl Lamp<'_> {
         let distance = span.length();
         let front = target.normal.dot(span) < 0.0;
         let near = if front { target.normal } else { -target.normal };
-        let left = around.optics.transmittance(bvh, from, at + near * bvh.offset());
+        let left = lit.optics.transmittance(from, at + near * bvh.offset());
         let flux = flux * left;
         if !(flux.max_element() > 0.0 && flux.is_finite()) {
             return None;
@@ -208,15 +210,15 @@ impl Lamp<'_> {
 }
 
 /// Follows light from its first optical surface to the first diffuse one.
-fn follow(around: Around, aimed: Aimed, share: f64, random: &mut Random) -> Option<Photon> {
-    let (bvh, optics) = (around.bvh, around.optics);
+fn follow(optics: &Optics, aimed: Aimed, share: f64, random: &mut Random) -> Option<Photon> {
+    let bvh = &optics.bvh;
     let Aimed { mut ray, mut meeting, flux } = aimed;
     let mut flux = flux * share as f32;
     let mut plain = true;
     for bounce in 0..optics.bounces {
         let mut arrives = !optics.optical[meeting.triangle as usize];
         if !arrives {
-            match optics.next(bvh, &ray, &meeting, random) {
+            match optics.next(&ray, &meeting, random) {
                 Continuation::Absorbed => return None,
                 // What the first surface scatters itself is direct light.
                 Continuation::Diffuse(_) if bounce == 0 => return None,

@@ -15,13 +15,13 @@ use super::sampling::hemisphere;
 use crate::error::Result;
 use crate::progress::Progress;
 use crate::random::Random;
-use crate::scene::bvh::{Ray, SceneBvh, Sides};
+use crate::scene::bvh::{Ray, Sides};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Where a gathering ray has ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum End {
+pub(crate) enum RayEnd {
     /// On a sender of the mesh.
     Sender(u32),
     /// On something that reflects nothing diffusely.
@@ -36,7 +36,6 @@ const BLACK: u32 = NONE;
 /// The surfaces that gathering rays meet.
 #[derive(Clone, Copy)]
 pub(crate) struct Surroundings<'a> {
-    pub(crate) bvh: &'a SceneBvh,
     pub(crate) mesh: &'a Elements,
     pub(crate) senders: &'a Senders,
     pub(crate) optics: &'a Optics,
@@ -45,31 +44,31 @@ pub(crate) struct Surroundings<'a> {
 impl Surroundings<'_> {
     /// Follows a ray to what sends the light that it brings, with what optics on the way leave of it; emission of sampled
     /// emitters is not part of that.
-    pub(crate) fn follow(&self, ray: Ray, random: &mut Random) -> (End, Vec3) {
+    pub(crate) fn follow(&self, ray: Ray, random: &mut Random) -> (RayEnd, Vec3) {
         let mut ray = ray;
         let mut weight = Vec3::ONE;
         for _ in 0..self.optics.bounces {
-            let Some(meeting) = self.bvh.meet(&ray, 0.0, f64::INFINITY, Sides::Both) else {
-                return (End::Escaped, weight);
+            let Some(meeting) = self.optics.bvh.meet(&ray, 0.0, f64::INFINITY, Sides::Both) else {
+                return (RayEnd::Escaped, weight);
             };
             if self.optics.optical[meeting.triangle as usize] {
-                match self.optics.next(self.bvh, &ray, &meeting, random) {
+                match self.optics.next(&ray, &meeting, random) {
                     Continuation::Onward(next, tint, _) => {
                         ray = next;
                         weight *= tint;
                         continue;
                     }
-                    Continuation::Absorbed => return (End::Black, weight),
+                    Continuation::Absorbed => return (RayEnd::Black, weight),
                     Continuation::Diffuse(share) => weight *= share,
                 }
             }
             let sender = self
                 .mesh
                 .locate(meeting.triangle, meeting.front, meeting.barycentric)
-                .and_then(|(element, weights)| self.mesh.sender(self.bvh, self.senders, element, weights));
-            return (sender.map_or(End::Black, End::Sender), weight);
+                .and_then(|(element, weights)| self.mesh.sender(&self.optics.bvh, self.senders, element, weights));
+            return (sender.map_or(RayEnd::Black, RayEnd::Sender), weight);
         }
-        (End::Black, weight)
+        (RayEnd::Black, weight)
     }
 }
 
@@ -88,7 +87,7 @@ pub(crate) struct Transport {
 
 /// What one vertex found beside the senders that it sees plainly.
 #[derive(Default)]
-struct Found {
+struct VertexGather {
     tinted: Vec<(u32, Vec3)>,
     counted: f32,
     escaped: Vec3,
@@ -98,17 +97,17 @@ struct Found {
 impl Transport {
     /// Casts `side`² rays from each vertex.
     pub(crate) fn cast(around: &Surroundings, side: usize, seed: u64, progress: &Progress) -> Result<Self> {
-        let (bvh, mesh) = (around.bvh, around.mesh);
+        let (bvh, mesh) = (&around.optics.bvh, around.mesh);
         let rays = side * side;
         let mut ends = vec![BLACK; mesh.vertices.len() * rays];
         progress.start("gathering indirect light", mesh.vertices.len() as u64);
-        let found: Vec<Found> = ends
+        let found: Vec<VertexGather> = ends
             .par_chunks_mut(rays.max(1))
             .zip(&mesh.vertices)
             .enumerate()
             .map(|(index, (ends, vertex))| {
                 progress.advance(1);
-                let mut found = Found::default();
+                let mut found = VertexGather::default();
                 if vertex.buried || progress.stopped() {
                     found.counted = rays as f32;
                     found.absorbed = Vec3::splat(found.counted);
@@ -124,16 +123,16 @@ impl Transport {
                     }
                     found.counted += 1.0;
                     let (reached, tint) = around.follow(Ray { origin, direction }, &mut random);
-                    let left = if reached == End::Black { Vec3::ZERO } else { tint };
+                    let left = if reached == RayEnd::Black { Vec3::ZERO } else { tint };
                     found.absorbed += Vec3::ONE - left;
                     *end = match reached {
-                        End::Escaped => {
+                        RayEnd::Escaped => {
                             found.escaped += tint;
                             BLACK
                         }
-                        End::Black => BLACK,
-                        End::Sender(sender) if tint == Vec3::ONE => sender,
-                        End::Sender(sender) => {
+                        RayEnd::Black => BLACK,
+                        RayEnd::Sender(sender) if tint == Vec3::ONE => sender,
+                        RayEnd::Sender(sender) => {
                             found.tinted.push((sender, tint));
                             BLACK
                         }

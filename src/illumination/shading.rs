@@ -2,7 +2,7 @@
 
 use super::elements::NONE;
 use super::emitters::ShadowRays;
-use super::radiosity::End;
+use super::radiosity::RayEnd;
 use super::{Illumination, Surface, sampling};
 use crate::random::Random;
 use crate::scene::bvh::{Hit, Ray};
@@ -13,7 +13,7 @@ const DOUBT_RAYS: u32 = 256;
 
 /// Where a hit lies in the mesh.
 #[derive(Clone, Copy)]
-struct Place {
+struct MeshPoint {
     /// The leaf, or [`NONE`].
     element: u32,
     weights: [f32; 3],
@@ -24,20 +24,20 @@ impl Illumination {
     ///
     /// `share` is the number of looks whose mean is taken: each then samples lamps and surroundings with that part of the
     /// rays of a single one.
-    pub fn radiance(&self, hit: &Hit, surface: &Surface, share: u32, random: &mut Random) -> Vec3 {
+    pub(crate) fn radiance(&self, hit: &Hit, surface: &Surface, share: u32, random: &mut Random) -> Vec3 {
         if !surface.is_diffuse() {
             return surface.emission;
         }
         let found = self.mesh.locate(hit.triangle, hit.front, hit.barycentric.map(|b| b as f32));
         let (element, weights) = found.unwrap_or((NONE, [0.0; 3]));
-        let place = Place { element, weights };
+        let place = MeshPoint { element, weights };
         let direct = self.direct(place, surface, share.max(1), random);
         surface.emission + surface.albedo * (direct + self.indirect(place, surface, share.max(1), random))
     }
 
     /// Irradiance over π that comes from lamps, straight or by way of mirrors and glass.
-    fn direct(&self, place: Place, surface: &Surface, share: u32, random: &mut Random) -> Vec3 {
-        let point = surface.position + surface.facing * self.bvh.offset();
+    fn direct(&self, place: MeshPoint, surface: &Surface, share: u32, random: &mut Random) -> Vec3 {
+        let at = surface.shading_point(self.bvh().offset());
         let clear = self.clear.get(place.element as usize).copied().unwrap_or(0);
         let (first, penumbra) = (self.settings.shadow_rays, self.settings.penumbra_rays);
         // A second set of rays where the first one disagrees is for single looks; means take one set.
@@ -45,14 +45,14 @@ impl Illumination {
             1 => ShadowRays { first, penumbra, clear },
             _ => ShadowRays { first: (first + penumbra).div_ceil(share), penumbra: 0, clear },
         };
-        let straight = self.emitters.light(&self.bvh, &self.optics, point, surface.normal, rays, random);
+        let (areas, points) = self.emitters.light(&self.optics, at, rays, random);
         let rays = ShadowRays { first: rays.first.div_ceil(2), penumbra: rays.penumbra / 2, ..rays };
-        let mirrored = self.images.strong(self.around(), point, surface.normal, rays, random);
-        straight + mirrored + self.caustics.light(surface.position, surface.facing)
+        let mirrored = self.images.strong(self.lamps(), at, rays, random);
+        areas + points + mirrored + self.caustics.light(surface.position, surface.facing)
     }
 
     /// Irradiance over π that comes by way of other surfaces.
-    fn indirect(&self, place: Place, surface: &Surface, share: u32, random: &mut Random) -> Vec3 {
+    fn indirect(&self, place: MeshPoint, surface: &Surface, share: u32, random: &mut Random) -> Vec3 {
         let rays = match self.settings.final_gather {
             Some(rays) => rays,
             None if place.element == NONE => return Vec3::ZERO,
@@ -65,14 +65,13 @@ impl Illumination {
                 DOUBT_RAYS
             }
         };
-        let point = surface.position + surface.facing * self.bvh.offset();
-        let images = self.images.weak(self.around(), point, surface.normal, random);
+        let images = self.images.weak(self.lamps(), surface.shading_point(self.bvh().offset()), random);
         images + self.gather(surface, f64::from(rays.div_ceil(share)).sqrt().ceil() as usize, random)
     }
 
     /// Indirect irradiance over π, gathered with `side`² rays from the mesh's radiosity.
     fn gather(&self, surface: &Surface, side: usize, random: &mut Random) -> Vec3 {
-        let origin = surface.position + surface.facing * self.bvh.offset();
+        let origin = surface.shading_point(self.bvh().offset()).position;
         let directions: Vec<DVec3> = sampling::hemisphere(surface.normal, side, random).collect();
         // `hemisphere` works on a copy of the stream; step past what it has used.
         *random = Random::new(random.bits(), 1);
@@ -81,7 +80,7 @@ impl Illumination {
         for direction in directions {
             if direction.dot(surface.facing) > 0.0 {
                 rays += 1.0;
-                if let (End::Sender(sender), weight) = around.follow(Ray { origin, direction }, random) {
+                if let (RayEnd::Sender(sender), weight) = around.follow(Ray { origin, direction }, random) {
                     sum += self.leaving[sender as usize] * weight;
                 }
             }

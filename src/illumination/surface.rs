@@ -1,53 +1,57 @@
 //! What a surface does to light at one point: glTF's material with its textures read.
 
-use super::paths::dielectric_reflectance;
-use crate::scene::{AlphaMode, Hit, Scene};
+use super::reflection::{MIRROR_ALPHA, WIDE_LOBE, dielectric_reflectance};
+use crate::scene::{AlphaMode, Hit, Scene, TextureRef, Triangle};
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
-
-/// Perceptual roughness from which a specular lobe is so wide that light transport takes it for diffuse.
-pub(crate) const WIDE_LOBE: f32 = 0.5;
-/// GGX α below which a lobe is narrower than a pixel of any picture: a mirror.
-pub(crate) const MIRROR_ALPHA: f32 = 2e-3;
 
 /// A surface at a point, ready for shading. Colours are linear Rec.709.
 #[derive(Clone, Copy, Debug)]
-pub struct Surface {
+pub(crate) struct Surface {
     /// Where [m].
-    pub position: DVec3,
+    pub(crate) position: DVec3,
     /// Unit geometric normal on the side that was met.
-    pub facing: DVec3,
+    pub(crate) facing: DVec3,
     /// Unit shading normal on the same side.
-    pub normal: DVec3,
+    pub(crate) normal: DVec3,
     /// Lambertian albedo.
-    pub albedo: Vec3,
+    pub(crate) albedo: Vec3,
     /// Specular reflectance at normal incidence.
-    pub specular: Vec3,
+    pub(crate) specular: Vec3,
     /// GGX α = perceptual roughness².
-    pub alpha: f32,
+    pub(crate) alpha: f32,
     /// Radiance emitted on the side that was met [W/(m² sr)].
-    pub emission: Vec3,
+    pub(crate) emission: Vec3,
     /// Part of the light that is not reflected and goes through instead of being scattered, times the tint.
-    pub transmission: Vec3,
+    pub(crate) transmission: Vec3,
     /// Index of refraction of what is behind the front side.
-    pub ior: f64,
+    pub(crate) ior: f64,
     /// Whether the surface bounds a volume (refracts) or is a thin wall (does not).
-    pub volume: bool,
+    pub(crate) volume: bool,
     /// Whether base colour is radiance and no light counts.
-    pub unlit: bool,
+    pub(crate) unlit: bool,
     /// Coverage: below one, part of the light goes straight on (alpha blending).
-    pub coverage: f32,
+    pub(crate) coverage: f32,
     /// Whether the front was met.
-    pub front: bool,
+    pub(crate) front: bool,
+}
+
+/// A point that is lit, lifted off its surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ShadingPoint {
+    /// Where [m].
+    pub(crate) position: DVec3,
+    /// Unit shading normal.
+    pub(crate) normal: DVec3,
 }
 
 impl Surface {
     /// Reads the material at a hit; textures are averaged over `footprint`, the width of what is looked at [m].
-    pub fn at(scene: &Scene, hit: &Hit, footprint: f64) -> Self {
+    pub(crate) fn at(scene: &Scene, hit: &Hit, footprint: f64) -> Self {
         let triangle = &scene.triangles[hit.triangle as usize];
         let material = scene.material(hit.triangle);
         let [v, w] = hit.barycentric.map(|b| b as f32);
         let u = 1.0 - v - w;
-        let texel = |reference: &crate::scene::TextureRef| -> Vec4 {
+        let texel = |reference: &TextureRef| -> Vec4 {
             let [a, b, c] = triangle.texcoords.map(|sets| sets[reference.texcoord as usize & 1]);
             let uv = reference.transform(a * u + b * v + c * w);
             let width = if footprint > 0.0 {
@@ -125,8 +129,13 @@ impl Surface {
         self
     }
 
+    /// The point from which rays leave: lifted by `offset` off the side that was met [m].
+    pub(crate) fn shading_point(&self, offset: f64) -> ShadingPoint {
+        ShadingPoint { position: self.position + self.facing * offset, normal: self.normal }
+    }
+
     /// Whether a specular lobe counts at all.
-    pub fn is_specular(&self) -> bool {
+    pub(crate) fn is_specular(&self) -> bool {
         self.specular.max_element() > 0.0
     }
 
@@ -136,7 +145,7 @@ impl Surface {
     }
 
     /// Whether anything of the surface scatters light diffusely.
-    pub fn is_diffuse(&self) -> bool {
+    pub(crate) fn is_diffuse(&self) -> bool {
         self.albedo.max_element() > 0.0
     }
 
@@ -158,7 +167,7 @@ impl Surface {
     }
 
     /// Schlick's Fresnel reflectance for a cosine of incidence, 1994.
-    pub fn fresnel(&self, cosine: f64) -> Vec3 {
+    pub(crate) fn fresnel(&self, cosine: f64) -> Vec3 {
         let grazing = (1.0 - cosine.clamp(0.0, 1.0)).powi(5) as f32;
         if self.is_specular() { self.specular + (Vec3::ONE - self.specular) * grazing } else { Vec3::ZERO }
     }
@@ -170,14 +179,7 @@ fn mean_fresnel(f0: f32) -> f32 {
 }
 
 /// The normal of a tangent-space texture; tangents follow the texture coordinates, as glTF says when none are given.
-fn bumped(
-    triangle: &crate::scene::Triangle,
-    reference: &crate::scene::TextureRef,
-    texel: Vec4,
-    scale: f32,
-    normal: DVec3,
-    side: f64,
-) -> DVec3 {
+fn bumped(triangle: &Triangle, reference: &TextureRef, texel: Vec4, scale: f32, normal: DVec3, side: f64) -> DVec3 {
     let [a, b, c] = triangle.texcoords.map(|sets| reference.transform(sets[reference.texcoord as usize & 1]));
     let [pa, pb, pc] = triangle.corners();
     let (d1, d2) = ((b - a).as_dvec2(), (c - a).as_dvec2());

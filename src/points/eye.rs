@@ -4,10 +4,10 @@
 //! A rough surface sends several rays into its lobe, which together are one end. Ways that have become weak are followed
 //! by chance, their weight raised in turn, so that the sum stays right.
 
+use super::settings::{MirrorDepth, TraceSettings};
 use super::wavefront::{Wavefront, normal_change};
 use crate::illumination::paths::{Ways, inside};
 use crate::illumination::{Illumination, Surface};
-use crate::points::trace::{MirrorDepth, TraceSettings};
 use crate::random::Random;
 use crate::scene::bvh::{Ray, Sides};
 use crate::scene::{Camera, Projection};
@@ -27,7 +27,7 @@ const FARTHEST: f64 = 4.0;
 
 /// Light by one way.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct End {
+pub(crate) struct PathEnd {
     pub(crate) radiance: Vec3,
     /// Where it seems to be, along the eye's ray [m].
     pub(crate) depth: f64,
@@ -39,7 +39,7 @@ pub(crate) struct End {
 
 /// All that one ray sees.
 #[derive(Clone, Debug)]
-pub(crate) struct Seen {
+pub(crate) struct RaySample {
     /// Sum of all ends.
     pub(crate) radiance: Vec3,
     /// The strongest end's depth [m]; zero for a miss.
@@ -50,10 +50,10 @@ pub(crate) struct Seen {
     pub(crate) first: u32,
     pub(crate) normal: DVec3,
     /// Ends, strongest first.
-    pub(crate) ends: Vec<End>,
+    pub(crate) ends: Vec<PathEnd>,
 }
 
-impl Seen {
+impl RaySample {
     /// A ray that meets nothing.
     pub(crate) fn nothing() -> Self {
         Self { radiance: Vec3::ZERO, depth: 0.0, bounces: 0, first: u32::MAX, normal: DVec3::ZERO, ends: Vec::new() }
@@ -102,20 +102,19 @@ impl<'a> Eye<'a> {
 
     /// Width of a pixel at a distance along its ray [m].
     fn footprint(&self, distance: f64) -> f64 {
-        let at_one_metre = self.pixel;
         match self.camera.projection {
-            Projection::Perspective { .. } => at_one_metre * distance,
-            Projection::Orthographic { .. } => at_one_metre,
+            Projection::Perspective { .. } => self.pixel * distance,
+            Projection::Orthographic { .. } => self.pixel,
         }
     }
 
     /// Follows the ray through a place of the picture.
     ///
     /// `share` is the number of looks whose mean is taken.
-    pub(crate) fn look(&self, column: f64, row: f64, share: u32, random: &mut Random) -> Seen {
+    pub(crate) fn look(&self, column: f64, row: f64, share: u32, random: &mut Random) -> RaySample {
         let ray = self.ray(column, row);
-        let mut seen = Seen::nothing();
-        let mut ends: Vec<End> = Vec::new();
+        let mut seen = RaySample::nothing();
+        let mut ends: Vec<PathEnd> = Vec::new();
         let mut groups = 0u16;
         let first = Branch {
             ray,
@@ -144,8 +143,8 @@ impl<'a> Eye<'a> {
     fn step(
         &self,
         mut branch: Branch,
-        seen: &mut Seen,
-        ends: &mut Vec<End>,
+        seen: &mut RaySample,
+        ends: &mut Vec<PathEnd>,
         open: &mut Vec<Branch>,
         groups: &mut u16,
         random: &mut Random,
@@ -180,7 +179,7 @@ impl<'a> Eye<'a> {
             let group = branch.group.unwrap_or_else(|| next(groups));
             let depth = self.depth(&branch);
             seen.radiance += radiance;
-            ends.push(End { radiance, depth, bounces: branch.bounces.min(255) as u8, group });
+            ends.push(PathEnd { radiance, depth, bounces: branch.bounces.min(255) as u8, group });
         }
         let bends = surface.is_specular() || surface.transmission.max_element() > 0.0;
         if surface.unlit || !bends || branch.bounces >= self.settings.bounces {
@@ -206,24 +205,18 @@ impl<'a> Eye<'a> {
             if number > 0 {
                 ways = Ways::new(&surface, ray.direction, random);
             }
-            let share = branch.weight / lobe as f32;
-            let half = ways.half;
-            let mut mirrored = Branch {
+            let onward = |part: Vec3, direction: DVec3, group: Option<u16>| Branch {
                 bounces: branch.bounces + 1,
                 share: branch.share * lobe,
-                group: groups[0],
-                ..own(share * ways.reflectance, Ray { origin: surface.position, direction: ways.mirrored })
+                group,
+                ..own(branch.weight / lobe as f32 * part, Ray { origin: surface.position, direction })
             };
-            mirrored.wave.reflect(ray.direction, half, &change);
+            let mut mirrored = onward(ways.reflectance, ways.mirrored, groups[0]);
+            mirrored.wave.reflect(ray.direction, ways.half, &change);
             push(open, mirrored, random);
-            let mut through = Branch {
-                bounces: branch.bounces + 1,
-                share: branch.share * lobe,
-                group: groups[1],
-                ..own(share * ways.transmittance, Ray { origin: surface.position, direction: ways.through })
-            };
+            let mut through = onward(ways.transmittance, ways.through, groups[1]);
             if surface.volume {
-                through.wave.refract(ray.direction, half, ways.ratio, &change);
+                through.wave.refract(ray.direction, ways.half, ways.ratio, &change);
             }
             push(open, through, random);
         }
@@ -259,8 +252,8 @@ fn push(open: &mut Vec<Branch>, mut branch: Branch, random: &mut Random) {
 }
 
 /// Puts ends of one group together, at the mean of their vergence weighted by light; strongest first.
-fn gathered(ends: Vec<End>) -> Vec<End> {
-    let mut sums: Vec<(End, f64, f64)> = Vec::with_capacity(ends.len());
+fn gathered(ends: Vec<PathEnd>) -> Vec<PathEnd> {
+    let mut sums: Vec<(PathEnd, f64, f64)> = Vec::with_capacity(ends.len());
     for end in ends {
         let light = f64::from(end.radiance.element_sum());
         match sums.iter_mut().find(|(sum, _, _)| sum.group == end.group) {
@@ -275,5 +268,5 @@ fn gathered(ends: Vec<End>) -> Vec<End> {
     }
     sums.sort_by(|a, b| b.1.total_cmp(&a.1));
     sums.retain(|(_, light, _)| *light > 0.0);
-    sums.into_iter().map(|(end, light, vergence)| End { depth: light / vergence, ..end }).collect()
+    sums.into_iter().map(|(end, light, vergence)| PathEnd { depth: light / vergence, ..end }).collect()
 }

@@ -177,7 +177,7 @@ fn glass_gives_two_points_on_one_ray() {
     let settings = TraceSettings { width: 9, height: 9, ..TraceSettings::default() };
     let traced = trace(&light, &camera, &settings, &Progress::new()).unwrap();
     let middle: Vec<_> = traced.points.iter().filter(|p| p.pixel == 40).collect();
-    let one = crate::illumination::paths::dielectric_reflectance(0.5f64.sqrt(), 1.0 / 1.5) as f32;
+    let one = crate::illumination::reflection::dielectric_reflectance(0.5f64.sqrt(), 1.0 / 1.5) as f32;
     let both = 2.0 * one / (1.0 + one);
     assert_eq!(middle.len(), 2, "{middle:?}");
     assert!((middle[0].radiance[1] - (1.0 - both)).abs() < 1e-5 && (middle[0].distance - 3.0).abs() < 1e-9);

@@ -30,14 +30,14 @@ impl Named for DepthScale {
 
 /// The viewing window that a picture fills: the panel as seen from the eye.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Window {
+pub struct PictureWindow {
     /// Distance of the eye in front of the panel [m].
     pub eye: f64,
     /// Half width and half height on the panel [m].
     pub half: [f64; 2],
 }
 
-impl Window {
+impl PictureWindow {
     /// The largest window of a picture's shape on the panel.
     ///
     /// # Errors
@@ -163,7 +163,7 @@ pub fn write_depths(
 /// `far`. Black pixels make no point. Phases are random under `seed`, or all zero without one.
 ///
 /// # Errors
-/// Those of [`RgbDepth::read`] and [`Window::new`]; [`Error::Input`] for a picture that is black.
+/// Those of [`RgbDepth::read`] and [`PictureWindow::new`]; [`Error::Input`] for a picture that is black.
 pub fn read(
     rgb: &Path,
     depth: &Path,
@@ -173,7 +173,7 @@ pub fn read(
     panel: &Grid,
 ) -> Result<PointCloud> {
     let read = RgbDepth::read(rgb, depth, scale, placement)?;
-    let window = Window::new(placement, read.size(), panel)?;
+    let window = PictureWindow::new(placement, read.size(), panel)?;
     let [width, height] = read.size().map(f64::from);
     let mut cloud = PointCloud { points: Vec::new(), rgb: Some(Vec::new()) };
     let amplitudes = cloud.rgb.get_or_insert_default();

@@ -1,4 +1,26 @@
 //! Point sources: what the scene's light becomes before it is a wave.
+//!
+//! ```
+//! use holodrive::field::Grid;
+//! use holodrive::illumination::{Illumination, IlluminationSettings};
+//! use holodrive::points::placement::Phase;
+//! use holodrive::points::{Placement, TraceSettings, place, trace};
+//! use holodrive::progress::Progress;
+//! use holodrive::scene::{SceneBvh, gltf};
+//!
+//! let (room, progress) = (gltf::load("scenes/cornell.gltf".as_ref(), &Default::default())?.scene, Progress::new());
+//! let settings = IlluminationSettings::default().coarse();
+//! let light = Illumination::new(SceneBvh::new(room.clone()), settings, &progress)?;
+//! let panel = Grid::new(1920, 1080, 8e-6, 8e-6)?;
+//! let placing = Placement::default().prepare(&room, &room.cameras[0], 1.0, &panel)?;
+//! let rays = TraceSettings { width: 24, height: 24, ..TraceSettings::default() };
+//! let traced = trace(&light, &placing.camera, &rays, &progress)?;
+//! let placed = place(&traced.world_points(), &placing, Phase::Random { seed: 1 }, &panel, 532e-9);
+//! // The room stands from 150 mm to 100 mm behind the panel.
+//! let (far, near) = placed.cloud.depth_range().ok_or_else(|| holodrive::Error::unsupported("no light"))?;
+//! assert!((far + 0.15).abs() < 1e-9 && (near + 0.1).abs() < 1e-9);
+//! # Ok::<(), holodrive::Error>(())
+//! ```
 
 pub mod budget;
 pub mod colour;
@@ -12,12 +34,13 @@ pub mod images;
 mod odd_tests;
 pub mod placement;
 pub mod ply;
+mod settings;
 pub mod slices;
-pub mod subframes;
+mod subframes;
 pub mod trace;
-pub mod view;
+mod view;
 mod wavefront;
-pub mod white;
+pub(crate) mod white;
 
 pub use exposure::{Exposure, Share};
 pub use from_scene::{LitScene, ScenePoints, SceneSettings};

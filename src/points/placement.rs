@@ -92,9 +92,18 @@ pub struct Placing {
     map: Map,
 }
 
+/// How a window maps camera depths: what the ends of which range become.
+#[derive(Clone, Copy, Debug)]
+struct DepthMap {
+    near: f64,
+    far: f64,
+    /// The range of camera depths; `None`: that of the points at hand.
+    held: Option<[f64; 2]>,
+}
+
 #[derive(Clone, Debug)]
 enum Map {
-    Window { near: f64, far: f64, held: Option<[f64; 2]> },
+    Window(DepthMap),
     Model { hologram_from_world: DMat4 },
 }
 
@@ -158,7 +167,7 @@ impl Placement {
                     let what = format!("near {near} m and far {far} m (z): far must be at or behind near");
                     return Err(Error::parameter("near/far", what));
                 }
-                let map = Map::Window { near, far, held: anchors.depths };
+                let map = Map::Window(DepthMap { near, far, held: anchors.depths });
                 Ok(Placing {
                     camera: camera.clone(),
                     aspect: picture_aspect,
@@ -173,7 +182,7 @@ impl Placement {
                     .ok_or_else(|| Error::parameter("placement", "the scene has no triangles to place"))?;
                 let scale = match scale {
                     Some(scale) if scale.is_finite() && scale > 0.0 => scale,
-                    Some(scale) => return Err(Error::parameter("scale", format!("{scale} must be greater than zero"))),
+                    Some(scale) => return Err(Error::out_of_range("scale", scale, "must be greater than zero")),
                     None => fitted_scale(window, half, eye, z)?,
                 };
                 // hologram = scale·axesᵀ·(world − center) + (0, 0, z)
@@ -218,7 +227,7 @@ fn fitted_scale(window: DVec2, half: DVec3, eye: f64, z: f64) -> Result<f64> {
     if scale.is_finite() && scale > 0.0 {
         Ok(scale)
     } else {
-        Err(Error::parameter("placement", "the scene has no extent, so it cannot be fitted; give --scale"))
+        Err(Error::parameter("placement", "the scene has no extent, so it cannot be fitted; give a scale"))
     }
 }
 
@@ -271,11 +280,11 @@ impl Placing {
             Map::Model { hologram_from_world } => {
                 points.iter().map(|p| hologram_from_world.transform_point3(p.position)).collect()
             }
-            Map::Window { near, far, held } => self.through_window(points, (*near, *far), *held),
+            Map::Window(depths) => self.through_window(points, *depths),
         }
     }
 
-    fn through_window(&self, points: &[WorldPoint], (near, far): (f64, f64), held: Option<[f64; 2]>) -> Vec<DVec3> {
+    fn through_window(&self, points: &[WorldPoint], DepthMap { near, far, held }: DepthMap) -> Vec<DVec3> {
         let camera_from_world = self.camera.world_from_camera.inverse();
         let seen: Vec<DVec3> = points.iter().map(|p| camera_from_world.transform_point3(p.position)).collect();
         let (half_width, half_height) = self.camera.half_size(self.aspect);
@@ -306,7 +315,7 @@ impl Placing {
     pub fn hologram_from_world(&self) -> Option<DMat4> {
         match self.map {
             Map::Model { hologram_from_world } => Some(hologram_from_world),
-            Map::Window { .. } => None,
+            Map::Window(_) => None,
         }
     }
 

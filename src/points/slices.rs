@@ -4,7 +4,7 @@
 //! sample of a plane looks up the picture, not the other way round.
 
 use super::colour::Lasers;
-use super::images::{Picture16, RgbDepth, Window, open};
+use super::images::{Picture16, PictureWindow, RgbDepth, open};
 use super::{Channel, Placement};
 use crate::error::{Error, Result};
 use crate::field::Grid;
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 
 /// What the light of a slice is taken from.
 #[derive(Clone, Debug)]
-pub enum Source {
+pub enum SliceSource {
     /// A picture cut by its depth map.
     Depth(RgbDepth),
     /// Pictures sharp at one depth each, that fill the window there; z [m], farthest first.
@@ -23,14 +23,14 @@ pub enum Source {
 
 /// One colour of light.
 #[derive(Clone, Copy, Debug)]
-pub enum Light<'a> {
+pub enum LightColor<'a> {
     /// A channel of linear Rec.709.
     Channel(Channel),
     /// The drive of one of three lasers.
     Laser(&'a Lasers, usize),
 }
 
-impl Light<'_> {
+impl LightColor<'_> {
     fn of(&self, rgb: [f32; 3]) -> f32 {
         match self {
             Self::Channel(channel) => channel.of(rgb),
@@ -53,8 +53,8 @@ pub struct Slice {
 /// Slices of a picture or a stack, made one after another.
 #[derive(Clone, Debug)]
 pub struct Slices {
-    source: Source,
-    window: Window,
+    source: SliceSource,
+    window: PictureWindow,
     /// The lattice of all slices: the panel's pitch, wide enough for the farthest.
     pub lattice: Grid,
     depths: Vec<f64>,
@@ -65,16 +65,16 @@ impl Slices {
     ///
     /// # Errors
     /// [`Error::Parameter`] for no planes.
-    pub fn of_depth(picture: RgbDepth, window: Window, panel: &Grid, planes: usize) -> Result<Self> {
+    pub fn of_depth(picture: RgbDepth, window: PictureWindow, panel: &Grid, planes: usize) -> Result<Self> {
         if planes == 0 || planes > 4096 {
-            return Err(Error::parameter("layers", format!("{planes}: one to 4096")));
+            return Err(Error::out_of_range("layers", planes, "must be 1 to 4096"));
         }
         let (low, high) = picture.depths().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
         let count = if high > low { planes } else { 1 };
         let step = (high - low) / count as f64;
         // Middles of equal parts: no sample is farther off than half a part.
         let depths = (0..count).map(|k| low + (k as f64 + 0.5) * step).collect();
-        Self::new(Source::Depth(picture), window, panel, depths)
+        Self::new(SliceSource::Depth(picture), window, panel, depths)
     }
 
     /// A focal stack: pictures and the depth z of each [m].
@@ -100,15 +100,19 @@ impl Slices {
         let Some((_, first)) = stack.first() else {
             return Err(Error::parameter("focal stack", "has no pictures"));
         };
-        let window = Window::new(placement, [first.width(), first.height()], panel)?;
+        let window = PictureWindow::new(placement, [first.width(), first.height()], panel)?;
         stack.sort_by(|a, b| a.0.total_cmp(&b.0));
         let depths = stack.iter().map(|(z, _)| *z).collect();
-        Self::new(Source::Stack(stack), window, panel, depths)
+        Self::new(SliceSource::Stack(stack), window, panel, depths)
     }
 
-    fn new(source: Source, window: Window, panel: &Grid, depths: Vec<f64>) -> Result<Self> {
+    fn new(source: SliceSource, window: PictureWindow, panel: &Grid, depths: Vec<f64>) -> Result<Self> {
         if let Some(z) = depths.iter().find(|z| z.is_nan() || **z >= window.eye) {
-            return Err(Error::parameter("depth", format!("{z} m is not in front of the eye at {} m", window.eye)));
+            return Err(Error::out_of_range(
+                "depth",
+                format!("{z} m"),
+                format!("is not in front of the eye at {} m", window.eye),
+            ));
         }
         let spread = depths.iter().map(|z| window.spread(*z)).fold(0.0, f64::max);
         let size = |half: f64, pitch: f64| ((2.0 * half * spread / pitch).ceil() as usize).max(1);
@@ -127,7 +131,7 @@ impl Slices {
     }
 
     /// Slice `index` in one colour of light.
-    pub fn slice(&self, index: usize, light: Light) -> Slice {
+    pub fn slice(&self, index: usize, light: LightColor) -> Slice {
         let z = self.depths[index];
         let lattice = self.lattice;
         let spread = self.window.spread(z);
@@ -137,8 +141,8 @@ impl Slices {
             _ => f64::INFINITY,
         };
         let (picture, cut) = match &self.source {
-            Source::Depth(picture) => (&picture.picture, Some(picture)),
-            Source::Stack(stack) => (&stack[index].1, None),
+            SliceSource::Depth(picture) => (&picture.picture, Some(picture)),
+            SliceSource::Stack(stack) => (&stack[index].1, None),
         };
         // The picture's pixels under one sample, at least the nearest.
         let scale = [
@@ -225,15 +229,15 @@ mod tests {
         let [rgb, depth] = picture(folder.path());
         let panel = Grid::new(160, 80, 8e-6, 8e-6).expect("panel");
         let placement = Placement::Window { eye: 0.5, near: 0.0, far: -0.1 };
-        let window = Window::new(&placement, [8, 4], &panel).expect("window");
+        let window = PictureWindow::new(&placement, [8, 4], &panel).expect("window");
         let picture = RgbDepth::read(&rgb, &depth, DepthScale::WhiteNear, &placement).expect("picture");
         let slices = Slices::of_depth(picture, window, &panel, 5).expect("slices");
         let depths = slices.depths().to_vec();
         assert!(depths.len() == 5 && depths[0] < depths[4], "{depths:?}");
         // At the far plane the window is 1.2 times as wide, less a tenth of a part.
         assert_eq!(slices.lattice.width, (160.0f64 * slices.window.spread(depths[0])).ceil() as usize);
-        let red = |k: usize| slices.slice(k, Light::Channel(Channel::Red));
-        let green = |k: usize| slices.slice(k, Light::Channel(Channel::Green));
+        let red = |k: usize| slices.slice(k, LightColor::Channel(Channel::Red));
+        let green = |k: usize| slices.slice(k, LightColor::Channel(Channel::Green));
         let lit = |s: &Slice| s.amplitudes.iter().filter(|a| **a > 0.0).count();
         let covered = |s: &Slice| s.covered.iter().filter(|c| **c).count();
         assert_eq!(lit(&red(0)) + lit(&green(4)) + (1..4).map(|k| covered(&red(k))).sum::<usize>(), 0);
@@ -268,7 +272,7 @@ mod tests {
         let placement = Placement::Window { eye: 0.5, near: 0.0, far: -0.1 };
         let slices = Slices::of_stack(&[(path.clone(), 0.0), (path, -0.05)], &placement, &panel).expect("stack");
         assert_eq!(slices.depths(), [-0.05, 0.0]);
-        let slice = slices.slice(1, Light::Channel(Channel::Luminance));
+        let slice = slices.slice(1, LightColor::Channel(Channel::Luminance));
         assert!(!slice.covered.contains(&true));
         let (lattice, mut lit) = (slices.lattice, 0);
         for (i, amplitude) in slice.amplitudes.iter().enumerate().filter(|(_, a)| **a > 0.0) {

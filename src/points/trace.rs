@@ -6,10 +6,10 @@
 //! (`wavefront`); on request at the length of the whole way eye → mirrors → surface (Nakamura, Yamaguchi & Yoshikawa).
 //! Behind flat mirrors both are the same.
 
+pub use super::settings::{MirrorDepth, TraceSettings};
 use crate::error::{Error, Result};
 use crate::illumination::Illumination;
-use crate::names::{Name, Named};
-use crate::points::eye::{Eye, Seen};
+use crate::points::eye::{Eye, RaySample};
 use crate::points::placement::WorldPoint;
 use crate::progress::Progress;
 use crate::random::Random;
@@ -18,60 +18,8 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// At which distance a point stands that is seen by way of mirrors or glass.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum MirrorDepth {
-    /// The length of the whole way, as in the seed paper: right for flat mirrors.
-    Path,
-    /// Where the eye focuses: also right for curved mirrors, lenses and glass plates.
-    #[default]
-    Focus,
-}
-
-impl Named for MirrorDepth {
-    const KIND: &'static str = "mirror depth";
-    const NAMES: &'static [Name<Self>] = &[
-        ("path", || Self::Path, "the length of the path, as in the seed paper"),
-        ("focus", || Self::Focus, "where the eye focuses"),
-    ];
-}
-
 /// Ends of a ray that bring less than this part of its light make no point of their own.
 const LEAST_SHARE: f32 = 0.01;
-
-/// How a scene is looked at.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TraceSettings {
-    /// Rays across the picture.
-    pub width: u32,
-    /// Rays down the picture.
-    pub height: u32,
-    /// Most mirrors or glass surfaces on one ray.
-    pub bounces: u32,
-    /// Sub-rays along each side of a pixel that covers an edge; 1 takes pixel centres only.
-    pub edge_rays: u32,
-    /// Where points stand that are seen by way of optics.
-    pub mirror_depth: MirrorDepth,
-    /// Whether each pixel's ray goes through a random place of it instead of its middle: points that are few then stand in
-    /// no lattice, whose orders an eye would see, and still one in each cell.
-    pub jitter: bool,
-    /// Seed of all sampling.
-    pub seed: u64,
-}
-
-impl Default for TraceSettings {
-    fn default() -> Self {
-        Self {
-            width: 500,
-            height: 500,
-            bounces: 32,
-            edge_rays: 3,
-            mirror_depth: MirrorDepth::Focus,
-            jitter: false,
-            seed: 1,
-        }
-    }
-}
 
 /// A point of light in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,7 +91,7 @@ pub fn trace(light: &Illumination, camera: &Camera, settings: &TraceSettings, pr
     let begin = Instant::now();
     let eye = Eye::new(light, camera, settings);
     progress.start("tracing rays", pixels);
-    let seen: Vec<Seen> = (0..pixels as u32)
+    let seen: Vec<RaySample> = (0..pixels as u32)
         .into_par_iter()
         .map(|pixel| {
             if pixel % width == 0 {
@@ -151,7 +99,7 @@ pub fn trace(light: &Illumination, camera: &Camera, settings: &TraceSettings, pr
             }
             let mut random = Random::new(settings.seed, u64::from(pixel));
             let [column, row] = place(pixel, settings);
-            if progress.stopped() { Seen::nothing() } else { eye.look(column, row, 1, &mut random) }
+            if progress.stopped() { RaySample::nothing() } else { eye.look(column, row, 1, &mut random) }
         })
         .collect();
     progress.check()?;
@@ -216,10 +164,9 @@ fn place(pixel: u32, settings: &TraceSettings) -> [f64; 2] {
 }
 
 /// Whether a pixel and a neighbour show different things: other surfaces, or a crease between them.
-fn is_edge(seen: &[Seen], pixel: usize, width: usize) -> bool {
+fn is_edge(seen: &[RaySample], pixel: usize, width: usize) -> bool {
     let here = &seen[pixel];
-    let column = pixel % width;
-    let differs = |other: &Seen| {
+    let differs = |other: &RaySample| {
         let depth = (other.depth - here.depth).abs() > 0.02 * here.depth.min(other.depth);
         let crease = other.first != here.first && other.normal.dot(here.normal) < 0.99;
         (other.depth > 0.0) != (here.depth > 0.0) || other.bounces != here.bounces || depth || crease || {
@@ -227,20 +174,16 @@ fn is_edge(seen: &[Seen], pixel: usize, width: usize) -> bool {
             (a - b).abs() > 0.5 * a.max(b)
         }
     };
-    let mut near = [None; 4];
-    if column > 0 {
-        near[0] = Some(pixel - 1);
-    }
-    if column + 1 < width {
-        near[1] = Some(pixel + 1);
-    }
-    if pixel >= width {
-        near[2] = Some(pixel - width);
-    }
-    if pixel + width < seen.len() {
-        near[3] = Some(pixel + width);
-    }
-    near.into_iter().flatten().any(|other| differs(&seen[other]))
+    neighbours(pixel, width, seen.len()).any(|other| differs(&seen[other]))
+}
+
+/// Pixels to the left, to the right, above and below one of a picture of `count` pixels.
+pub(super) fn neighbours(pixel: usize, width: usize, count: usize) -> impl Iterator<Item = usize> {
+    let column = pixel % width;
+    let left = (column > 0).then(|| pixel - 1);
+    let right = Some(pixel + 1).filter(|&p| column + 1 < width && p < count);
+    let (above, below) = (pixel.checked_sub(width), Some(pixel + width).filter(|&p| p < count));
+    [left, right, above, below].into_iter().flatten()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! What an eye should see of a scene: the traced picture with the depth of each pixel.
 
 use super::placement::{Placed, Placing};
-use super::trace::Traced;
+use super::trace::{Traced, neighbours};
 use std::collections::{BTreeMap, VecDeque};
 
 /// The traced picture and where each of its pixels stands before the panel: the target of every reconstruction.
@@ -44,11 +44,7 @@ impl SceneView {
 fn spread(depths: &mut [Option<f64>], width: usize) {
     let mut front: VecDeque<usize> = (0..depths.len()).filter(|&i| depths[i].is_some()).collect();
     while let Some(at) = front.pop_front() {
-        let (column, last) = (at % width, depths.len() - 1);
-        let left = (column > 0).then(|| at - 1);
-        let right = (column + 1 < width && at < last).then(|| at + 1);
-        let (up, down) = (at.checked_sub(width), Some(at + width).filter(|&d| d <= last));
-        for next in [left, right, up, down].into_iter().flatten() {
+        for next in neighbours(at, width, depths.len()) {
             if depths[next].is_none() {
                 depths[next] = depths[at];
                 front.push_back(next);

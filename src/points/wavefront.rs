@@ -96,7 +96,7 @@ pub(crate) fn normal_change(scene: &Scene, hit: &Hit) -> impl Fn(DVec3) -> DVec3
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::illumination::paths::refracted;
+    use crate::illumination::reflection::refracted;
 
     #[test]
     fn free_space_and_flat_mirrors_keep_the_path() {

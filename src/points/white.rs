@@ -61,7 +61,7 @@ impl WhitePoint {
         let white = match self {
             Self::Unlimited | Self::Auto => white_level(picture),
             Self::At(white) if white.is_finite() && white > 0.0 => white,
-            Self::At(white) => return Err(Error::parameter("white", format!("{white} must be greater than zero"))),
+            Self::At(white) => return Err(Error::out_of_range("white", white, "must be greater than zero")),
         };
         let mut level = WhiteLevel { white, clips: self != Self::Unlimited, ..WhiteLevel::default() };
         let (mut all, mut above) = (0.0, 0.0);
@@ -91,7 +91,7 @@ fn brightness(rgb: [f32; 3]) -> f32 {
 
 /// Brightness that pictures of a scene show as white [W/(m² sr)]: a quarter above what 97 % of its lit pixels do not
 /// pass; 1 for a picture without light.
-pub fn white_level(picture: &[[f32; 3]]) -> f32 {
+pub(crate) fn white_level(picture: &[[f32; 3]]) -> f32 {
     let mut lit: Vec<f32> = picture.iter().map(|rgb| brightness(*rgb)).filter(|l| *l > 0.0).collect();
     lit.sort_by(f32::total_cmp);
     lit.get(lit.len() * 97 / 100).map_or(1.0, |level| 1.25 * level)

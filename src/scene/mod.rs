@@ -4,6 +4,8 @@
 //! World space is glTF's: metres, right-handed, +y up; a camera looks along its own −z.
 
 pub mod bvh;
+#[cfg(test)]
+mod bvh_tests;
 pub mod camera;
 pub mod gltf;
 pub mod material;

@@ -3,7 +3,7 @@
 use super::{Layer, bytes, compute};
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Field, Grid};
-use crate::points::slices::{Light, Slices};
+use crate::points::slices::{LightColor, Slices};
 use crate::progress::Progress;
 use crate::random::Random;
 
@@ -24,7 +24,7 @@ pub struct SliceSettings {
 /// As [`compute`]; [`Error::Parameter`] where nothing has light of this colour.
 pub fn of_slices(
     slices: &Slices,
-    light: Light,
+    light: LightColor,
     panel: &Grid,
     wavelength: f64,
     settings: &SliceSettings,

@@ -18,13 +18,13 @@ pub(super) struct Pose {
 }
 
 #[derive(Clone, Copy)]
-struct Parts {
+struct LocalTransform {
     translation: DVec3,
     rotation: DQuat,
     scale: DVec3,
 }
 
-impl Parts {
+impl LocalTransform {
     fn matrix(self) -> DMat4 {
         DMat4::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
     }
@@ -38,7 +38,7 @@ impl Pose {
         let mut weights = Vec::with_capacity(nodes.len());
         let mut parts = Vec::with_capacity(nodes.len());
         for (i, node) in nodes.iter().enumerate() {
-            let rest = Parts {
+            let rest = LocalTransform {
                 translation: node.translation.map_or(DVec3::ZERO, |t| glam::Vec3::from(t).as_dvec3()),
                 rotation: unit(node.rotation.unwrap_or_default().0.map(f64::from)),
                 scale: node.scale.map_or(DVec3::ONE, |s| glam::Vec3::from(s).as_dvec3()),
@@ -50,11 +50,8 @@ impl Pose {
             }
             parent_from_node.push(local);
             parts.push(rest);
-            let of_mesh = match node.mesh {
-                Some(mesh) => document.get(mesh, "a node's mesh")?.weights.clone(),
-                None => None,
-            };
-            weights.push(node.weights.clone().or(of_mesh).unwrap_or_default());
+            let mesh = node.mesh.map(|mesh| document.get(mesh, "a node's mesh")).transpose()?;
+            weights.push(node.weights.as_ref().or(mesh.and_then(|m| m.weights.as_ref())).cloned().unwrap_or_default());
         }
         let mut pose = Self { parent_from_node, weights };
         if let Some(animation) = chosen_clip(document, clip)? {
@@ -71,7 +68,7 @@ impl Pose {
         &mut self,
         document: &Document,
         animation: &json::Animation,
-        parts: &mut [Parts],
+        parts: &mut [LocalTransform],
         time: f64,
     ) -> Result<()> {
         for (i, channel) in animation.channels.iter().enumerate() {
@@ -86,8 +83,8 @@ impl Pose {
                 continue;
             };
             match property {
-                Property::Translation => parts[node].translation = vector(sample(document, sampler, time, &what)?),
-                Property::Scale => parts[node].scale = vector(sample(document, sampler, time, &what)?),
+                Property::Translation => parts[node].translation = sample(document, sampler, time, &what)?.into(),
+                Property::Scale => parts[node].scale = sample(document, sampler, time, &what)?.into(),
                 Property::Rotation => parts[node].rotation = unit(sample(document, sampler, time, &what)?),
                 Property::MorphTargetWeights => {
                     self.weights[node] = sample_weights(document, sampler, time, &what)?;
@@ -98,10 +95,6 @@ impl Pose {
         }
         Ok(())
     }
-}
-
-fn vector(v: [f64; 3]) -> DVec3 {
-    v.into()
 }
 
 /// Files hold quaternions rounded to f32 or to normalised bytes, so that their length must be restored.
@@ -118,7 +111,7 @@ fn chosen_clip<'a>(document: &'a Document, clip: &Clip) -> Result<Option<&'a jso
         Clip::First => Ok(animations.first()),
         Clip::Of(choice) => {
             let names: Vec<Vec<&str>> = animations.iter().map(|a| a.name.as_deref().into_iter().collect()).collect();
-            Ok(Some(&animations[choose(choice, &names, "--animation", "animation")?]))
+            Ok(Some(&animations[choose(choice, &names, "animation")?]))
         }
     }
 }
@@ -137,7 +130,7 @@ pub(super) fn times(document: &Document, clip: &Clip) -> Result<Option<[f64; 2]>
 }
 
 /// Where a time lies among key times.
-struct Position {
+struct KeyPosition {
     /// The key at or before the time (or the first one).
     key: usize,
     /// The key after it; the same one outside the keys.
@@ -153,7 +146,7 @@ fn position(
     sampler: &json::animation::Sampler,
     time: f64,
     what: &str,
-) -> Result<(Position, usize)> {
+) -> Result<(KeyPosition, usize)> {
     let keys = document.vectors::<1>(sampler.input, what)?;
     if keys.is_empty() || keys.windows(2).any(|pair| pair[0] >= pair[1]) {
         return Err(document.error(format!("{what} has key times that do not increase")));
@@ -163,7 +156,7 @@ fn position(
     let (start, end) = (f64::from(keys[key][0]), f64::from(keys[next][0]));
     let span = end - start;
     let part = if span > 0.0 { (time - start) / span } else { 0.0 };
-    Ok((Position { key, next, part, span }, keys.len()))
+    Ok((KeyPosition { key, next, part, span }, keys.len()))
 }
 
 fn interpolation(document: &Document, sampler: &json::animation::Sampler, what: &str) -> Result<Interpolation> {
@@ -243,7 +236,7 @@ fn check_count(
 }
 
 /// Cubic Hermite spline of glTF 2.0, appendix C: from `v0` with out-tangent `b0` to `v1` with in-tangent `a1`.
-fn hermite(v0: f64, b0: f64, v1: f64, a1: f64, at: &Position) -> f64 {
+fn hermite(v0: f64, b0: f64, v1: f64, a1: f64, at: &KeyPosition) -> f64 {
     let (t, td) = (at.part, at.span);
     let (t2, t3) = (t * t, t * t * t);
     (2.0 * t3 - 3.0 * t2 + 1.0) * v0 + td * (t3 - 2.0 * t2 + t) * b0 + (3.0 * t2 - 2.0 * t3) * v1 + td * (t3 - t2) * a1

@@ -49,7 +49,7 @@ pub(super) fn read(
         names.push(its_names);
     }
     if let Some(choice) = choice {
-        let chosen = choose(choice, &names, "--camera", "camera")?;
+        let chosen = choose(choice, &names, "camera")?;
         cameras[..=chosen].rotate_right(1);
     }
     if cameras.is_empty() {

@@ -97,8 +97,13 @@ impl Document {
     }
 }
 
-/// Finds what a user chose among `names` (each thing may have several names); `setting` and `kind` are for the error.
-pub(super) fn choose(choice: &Choice, names: &[Vec<&str>], setting: &'static str, kind: &str) -> Result<usize> {
+/// What one of several things in a file is called in messages.
+pub(super) fn called(kind: &str, number: usize, name: Option<&str>) -> String {
+    name.map_or_else(|| format!("{kind} {number}"), |name| format!("{kind} {number} '{name}'"))
+}
+
+/// Finds what a user chose among `names` (each thing may have several names); `kind` is for the error.
+pub(super) fn choose(choice: &Choice, names: &[Vec<&str>], kind: &'static str) -> Result<usize> {
     let found = match choice {
         Choice::Name(name) => names.iter().position(|n| n.contains(&name.as_str())),
         Choice::Index(i) => Some(*i).filter(|&i| i < names.len()),
@@ -114,7 +119,7 @@ pub(super) fn choose(choice: &Choice, names: &[Vec<&str>], setting: &'static str
             .map(|(i, n)| n.first().map_or_else(|| i.to_string(), |n| format!("{i} '{n}'")))
             .collect();
         let there = if there.is_empty() { "none".to_owned() } else { there.join(", ") };
-        Error::parameter(setting, format!("the file has no {kind} {asked}; it has {there}"))
+        Error::parameter(kind, format!("the file has no {kind} {asked}; it has {there}"))
     })
 }
 

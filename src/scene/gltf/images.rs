@@ -50,17 +50,11 @@ impl Textures {
         if let Some(&known) = self.numbers.get(&key) {
             return Ok(known);
         }
-        let sampler = match described.sampler {
-            Some(sampler) => Some(document.get(sampler, "a texture's sampler")?),
-            None => None,
-        };
-        let number = match self.decode(document, described, sampler, srgb, warnings)? {
-            Some(texture) => {
-                self.decoded.push(texture);
-                Some(self.decoded.len() as u32 - 1)
-            }
-            None => None,
-        };
+        let sampler = described.sampler.map(|sampler| document.get(sampler, "a texture's sampler")).transpose()?;
+        let number = self.decode(document, described, sampler, srgb, warnings)?.map(|texture| {
+            self.decoded.push(texture);
+            self.decoded.len() as u32 - 1
+        });
         self.numbers.insert(key, number);
         Ok(number)
     }

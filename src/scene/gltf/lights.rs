@@ -1,5 +1,6 @@
 //! Punctual lights of the file, and the light of a file that has none.
 
+use super::LoadOptions;
 use super::cameras::rigid;
 use super::document::Document;
 use super::meshes::UsedMaterials;
@@ -75,11 +76,11 @@ pub(super) fn ensure_light(
     document: &Document,
     scene: &mut Scene,
     used: &UsedMaterials,
-    (wanted, framed): (bool, Option<(DVec3, DVec3)>),
+    options: &LoadOptions,
     warnings: &mut Vec<Warning>,
 ) -> Result<()> {
-    if wanted {
-        viewer_light(scene, framed);
+    if options.viewer_light {
+        viewer_light(scene, options.framed);
         return Ok(());
     }
     // The coarsest level is the mean of the picture: some exporters write full emission times a black picture.
@@ -105,7 +106,7 @@ pub(super) fn ensure_light(
              zero, or remove them all for a default light",
         ));
     }
-    viewer_light(scene, framed);
+    viewer_light(scene, options.framed);
     warnings.push(Warning(format!(
         "the file has no light; it is lit by a directional light of {KEY_IRRADIANCE} W/m² from the viewer's upper left \
          and a point light at the camera that gives {FILL_IRRADIANCE} W/m² at the middle of the scene"

@@ -1,6 +1,6 @@
 //! Materials: metallic-roughness and the extensions that light needs.
 
-use super::document::Document;
+use super::document::{Document, called};
 use super::images::Textures;
 use super::meshes::UsedMaterials;
 use crate::error::Result;
@@ -9,6 +9,7 @@ use glam::{Vec2, Vec3};
 use gltf::json;
 use json::extensions::texture::TextureTransform;
 use json::validation::Checked;
+use serde::Deserialize;
 
 /// The materials `used` by triangles, in that order, and the textures that they need.
 pub(super) fn read(
@@ -37,10 +38,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn material(&mut self, number: usize, json: &json::Material) -> Result<Material> {
-        self.name = match &json.name {
-            Some(name) => format!("material {number} '{name}'"),
-            None => format!("material {number}"),
-        };
+        self.name = called("material", number, json.name.as_deref());
         let pbr = &json.pbr_metallic_roughness;
         let [r, g, b, alpha] = pbr.base_color_factor.0;
         let mut material = Material {
@@ -138,13 +136,10 @@ impl Reader<'_> {
     fn normal_texture(&mut self, info: Option<&json::material::NormalTexture>) -> Result<Option<(TextureRef, f32)>> {
         let Some(info) = info else { return Ok(None) };
         // The schema has no place for this extension on normal textures, though the extension allows it there.
-        let transform = match info.extensions.as_ref().and_then(|e| e.others.get("KHR_texture_transform")) {
-            Some(value) => Some(
-                serde_json::from_value::<TextureTransform>(value.clone())
-                    .map_err(|why| self.document.error(format!("KHR_texture_transform of {}: {why}", self.name)))?,
-            ),
-            None => None,
-        };
+        let written = info.extensions.as_ref().and_then(|e| e.others.get("KHR_texture_transform"));
+        let transform = written.map(|value| TextureTransform::deserialize(value)).transpose();
+        let transform =
+            transform.map_err(|why| self.document.error(format!("KHR_texture_transform of {}: {why}", self.name)))?;
         let reference = self.texture_ref(info.index, info.tex_coord, transform.as_ref(), false)?;
         Ok(reference.map(|reference| (reference, info.scale)))
     }

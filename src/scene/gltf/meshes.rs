@@ -1,7 +1,7 @@
 //! Meshes to world-space triangles: topology, morph targets, skins, mirrored transforms.
 
 use super::animation::Pose;
-use super::document::Document;
+use super::document::{Document, called};
 use super::nodes::{Nodes, node_name};
 use super::primitives::{Primitive, primitive_size, read_primitive};
 use crate::error::Result;
@@ -44,7 +44,7 @@ pub(super) fn triangles(
         if decoded[number].is_none() {
             let mut primitives = Vec::with_capacity(meshed.primitives.len());
             for (i, primitive) in meshed.primitives.iter().enumerate() {
-                let what = primitive_name(meshed, number, i);
+                let what = format!("primitive {i} of {}", called("mesh", number, meshed.name.as_deref()));
                 match read_primitive(document, primitive, &what)? {
                     Some(primitive) => {
                         left_out.incomplete += usize::from(primitive.incomplete);
@@ -55,10 +55,7 @@ pub(super) fn triangles(
             }
             decoded[number] = Some(primitives);
         }
-        let skin = match document.root.nodes[node].skin {
-            Some(skin) => Some(joint_matrices(document, nodes, skin)?),
-            None => None,
-        };
+        let skin = document.root.nodes[node].skin.map(|skin| joint_matrices(document, nodes, skin)).transpose()?;
         for primitive in decoded[number].iter().flatten() {
             let placement = Placement::new(nodes.world_from_node[node], skin.as_deref(), primitive);
             let material = used.iter().position(|&m| m == primitive.material).unwrap_or_else(|| {
@@ -80,13 +77,6 @@ pub(super) fn triangles(
         return Err(document.error("there is no triangle in the scene; a scene needs at least one surface"));
     }
     Ok((triangles, used))
-}
-
-fn primitive_name(mesh: &json::Mesh, number: usize, primitive: usize) -> String {
-    match &mesh.name {
-        Some(name) => format!("primitive {primitive} of mesh {number} '{name}'"),
-        None => format!("primitive {primitive} of mesh {number}"),
-    }
 }
 
 fn warn(left_out: &LeftOut, warnings: &mut Vec<Warning>) {
@@ -127,10 +117,8 @@ fn check_size(document: &Document, nodes: &Nodes) -> Result<()> {
 fn joint_matrices(document: &Document, nodes: &Nodes, skin: json::Index<json::Skin>) -> Result<Vec<DMat4>> {
     let what = format!("skin {skin}");
     let skin = document.get(skin, "a node's skin")?;
-    let inverse_bind: Option<Vec<[f32; 16]>> = match skin.inverse_bind_matrices {
-        Some(index) => Some(document.vectors(index, &format!("inverse bind matrices of {what}"))?),
-        None => None,
-    };
+    let read = |index| document.vectors::<16>(index, &format!("inverse bind matrices of {what}"));
+    let inverse_bind = skin.inverse_bind_matrices.map(read).transpose()?;
     let mut matrices = Vec::with_capacity(skin.joints.len());
     for (i, &joint) in skin.joints.iter().enumerate() {
         document.get(joint, &what)?;

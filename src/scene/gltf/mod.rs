@@ -4,6 +4,16 @@
 //! malformed files, so every index is looked up here with a check, and every byte range is checked before it is read:
 //! a malformed file is an [`Error::Input`] in one line that says what is wrong and where.
 //!
+//! ```
+//! use holodrive::scene::gltf::{LoadOptions, load};
+//!
+//! let loaded = load("scenes/cornell.gltf".as_ref(), &LoadOptions::default())?;
+//! assert!(loaded.warnings.is_empty() && loaded.scene.cameras.len() == 1);
+//! let nobody = LoadOptions { camera: Some("nobody".into()), ..LoadOptions::default() };
+//! assert!(load("scenes/cornell.gltf".as_ref(), &nobody).is_err());
+//! # Ok::<(), holodrive::Error>(())
+//! ```
+//!
 //! # What is read
 //!
 //! `.gltf` and `.glb`; buffers and images in the file, in data URIs or in files beside it; node trees with matrices,
@@ -89,8 +99,8 @@ pub struct LoadOptions {
     pub time: f64,
     /// Whether the light that a file without any gets is added to the file's own.
     pub viewer_light: bool,
-    /// Box (low, high) [m] for which the camera and the light are made that a file without them gets; `None`: that of the
-    /// scene as it is posed. An animation whose poses are to be seen by one camera gives the box of all of them.
+    /// A file without a camera or a light is given one that suits this box (low, high) [m]. `None`: the box of the scene
+    /// as it is posed. An animation that one camera is to see gives the box of all its poses.
     pub framed: Option<(DVec3, DVec3)>,
 }
 
@@ -153,8 +163,7 @@ impl File {
     /// As [`load`].
     pub fn pose(&mut self, options: &LoadOptions) -> Result<Loaded> {
         if !options.time.is_finite() {
-            let what = format!("{} is not a time; give seconds, such as 1.5s", options.time);
-            return Err(Error::parameter("--time", what));
+            return Err(Error::out_of_range("time", options.time, "is not a time"));
         }
         let document = &self.document;
         let mut warnings = self.warnings.clone();
@@ -177,8 +186,7 @@ impl File {
         let lights = lights::read(document, &nodes)?;
 
         let mut scene = Scene { triangles, materials, textures, lights, cameras };
-        let (used, wanted) = (&decoded.used, options.viewer_light);
-        lights::ensure_light(document, &mut scene, used, (wanted, options.framed), &mut warnings)?;
+        lights::ensure_light(document, &mut scene, &decoded.used, options, &mut warnings)?;
         self.decoded = Some(decoded);
         Ok(Loaded { scene: Arc::new(scene), warnings })
     }

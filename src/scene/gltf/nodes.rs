@@ -2,7 +2,7 @@
 
 use super::Choice;
 use super::animation::Pose;
-use super::document::{Document, choose};
+use super::document::{Document, called, choose};
 use crate::error::Result;
 use glam::DMat4;
 use gltf::json;
@@ -57,10 +57,7 @@ impl Nodes {
 
 /// How a node is called in messages.
 pub(super) fn node_name(document: &Document, node: usize) -> String {
-    match document.root.nodes.get(node).and_then(|n| n.name.as_deref()) {
-        Some(name) => format!("node {node} '{name}'"),
-        None => format!("node {node}"),
-    }
+    called("node", node, document.root.nodes.get(node).and_then(|n| n.name.as_deref()))
 }
 
 fn parents(document: &Document) -> Result<Vec<Option<usize>>> {
@@ -99,10 +96,8 @@ fn chosen_scene<'a>(document: &'a Document, scene: Option<&Choice>) -> Result<Op
     let root = &document.root;
     if let Some(choice) = scene {
         let names: Vec<Vec<&str>> = root.scenes.iter().map(|s| s.name.as_deref().into_iter().collect()).collect();
-        return Ok(Some(&root.scenes[choose(choice, &names, "--scene", "scene")?]));
+        return Ok(Some(&root.scenes[choose(choice, &names, "scene")?]));
     }
-    match root.scene {
-        Some(index) => Ok(Some(document.get(index, "the default scene")?)),
-        None => Ok(root.scenes.first()),
-    }
+    let default = root.scene.map(|index| document.get(index, "the default scene")).transpose()?;
+    Ok(default.or(root.scenes.first()))
 }

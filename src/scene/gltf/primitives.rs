@@ -109,14 +109,10 @@ pub(super) fn read_primitive(
     let count = positions.len();
     let reader = Attributes { document, primitive, what, count };
 
-    let normals = match attribute(primitive, Semantic::Normals) {
-        // A normal that is not finite or zero is replaced by the triangle's own, so that it is no reason to refuse.
-        Some(index) => {
-            let normals = document.vectors_maybe_nan(index, &format!("NORMAL of {what}"))?;
-            Some(reader.checked(normals, "NORMAL")?)
-        }
-        None => None,
-    };
+    // A normal that is not finite or zero is replaced by the triangle's own, so that it is no reason to refuse.
+    let normals = attribute(primitive, Semantic::Normals)
+        .map(|index| reader.checked(document.vectors_maybe_nan(index, &format!("NORMAL of {what}"))?, "NORMAL"))
+        .transpose()?;
     let texcoords = [reader.read(Semantic::TexCoords(0))?, reader.read(Semantic::TexCoords(1))?];
     let colors = reader.colors()?;
     let influences = reader.influences()?;
@@ -133,13 +129,8 @@ pub(super) fn read_primitive(
         None => (0..count as u32).collect(),
     };
     let (triangles, incomplete) = assemble(&corners, mode);
-    let material = match primitive.material {
-        Some(material) => {
-            document.get(material, what)?;
-            Some(material.value())
-        }
-        None => None,
-    };
+    let material =
+        primitive.material.map(|material| document.get(material, what).map(|_| material.value())).transpose()?;
     let primitive =
         Primitive { positions, normals, texcoords, colors, influences, targets, triangles, material, incomplete };
     Ok(Some(primitive))

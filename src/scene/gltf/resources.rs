@@ -1,5 +1,9 @@
 //! Bytes from where URIs point: files beside the scene, and data URIs.
 
+use base64::Engine;
+use base64::alphabet;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use percent_encoding::percent_decode_str;
 use std::borrow::Cow;
 use std::fs::File;
 use std::io::Read;
@@ -34,7 +38,7 @@ pub(super) fn path_of(scene: &Path, uri: &str) -> Result<PathBuf, String> {
     if scheme || uri.starts_with(['/', '\\']) {
         return Err(format!("'{uri}' is not a path relative to the scene; put the file beside it and name that"));
     }
-    let relative = String::from_utf8(percent_decoded(uri).into_owned())
+    let relative = String::from_utf8(percent_decode_str(uri).collect())
         .map_err(|_| format!("'{uri}' is not UTF-8 after its %-signs are decoded"))?;
     Ok(scene.parent().unwrap_or(Path::new("")).join(&relative))
 }
@@ -43,56 +47,30 @@ pub(super) fn path_of(scene: &Path, uri: &str) -> Result<PathBuf, String> {
 fn decode_data_uri(data: &str) -> Result<Vec<u8>, String> {
     let (kind, content) = data.split_once(',').ok_or("the data URI has no comma; it is cut short")?;
     if kind.split(';').any(|part| part.eq_ignore_ascii_case("base64")) {
-        decode_base64(&percent_decoded(content))
+        decode_base64(&Cow::from(percent_decode_str(content)))
     } else {
-        Ok(percent_decoded(content).into_owned())
+        Ok(percent_decode_str(content).collect())
     }
 }
 
-/// `%41` becomes `A`; a percent sign that no two hexadecimal digits follow stands for itself.
-fn percent_decoded(text: &str) -> Cow<'_, [u8]> {
-    let bytes = text.as_bytes();
-    if !bytes.contains(&b'%') {
-        return Cow::Borrowed(bytes);
-    }
-    let digit = |at: usize| bytes.get(at).and_then(|&b| char::from(b).to_digit(16));
-    let mut decoded = Vec::with_capacity(bytes.len());
-    let mut at = 0;
-    while at < bytes.len() {
-        if let (b'%', Some(high), Some(low)) = (bytes[at], digit(at + 1), digit(at + 2)) {
-            decoded.push((high * 16 + low) as u8);
-            at += 3;
-        } else {
-            decoded.push(bytes[at]);
-            at += 1;
-        }
-    }
-    Cow::Owned(decoded)
-}
+/// Either alphabet is written as the standard one before it is decoded; padding may be missing.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &alphabet::STANDARD,
+    GeneralPurposeConfig::new()
+        .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+        .with_decode_allow_trailing_bits(true),
+);
 
 /// Base64 (RFC 4648), with the standard or the URL alphabet, padded or not; white space is passed over.
 fn decode_base64(text: &[u8]) -> Result<Vec<u8>, String> {
-    let mut decoded = Vec::with_capacity(text.len() / 4 * 3 + 3);
-    let (mut bits, mut count) = (0u32, 0u32);
-    for (at, &symbol) in text.iter().enumerate() {
-        let value = match symbol {
-            b'A'..=b'Z' => symbol - b'A',
-            b'a'..=b'z' => symbol - b'a' + 26,
-            b'0'..=b'9' => symbol - b'0' + 52,
-            b'+' | b'-' => 62,
-            b'/' | b'_' => 63,
-            b' ' | b'\t' | b'\r' | b'\n' => continue,
-            b'=' => break,
-            _ => return Err(format!("byte {at} of the data URI is no base64 symbol; it is damaged")),
-        };
-        bits = (bits << 6) | u32::from(value);
-        count += 6;
-        if count >= 8 {
-            count -= 8;
-            decoded.push((bits >> count) as u8);
-        }
-    }
-    Ok(decoded)
+    let standard = |&symbol: &u8| match symbol {
+        b' ' | b'\t' | b'\r' | b'\n' => None,
+        b'-' => Some(b'+'),
+        b'_' => Some(b'/'),
+        other => Some(other),
+    };
+    let text: Vec<u8> = text.iter().filter_map(standard).collect();
+    BASE64.decode(text).map_err(|why| format!("the base64 of the data URI is damaged: {why}"))
 }
 
 #[cfg(test)]
@@ -110,7 +88,7 @@ mod tests {
         assert_eq!(decode_base64(b"Zm9v\nYmFy").as_deref(), Ok(&b"foobar"[..]));
         assert_eq!(decode_base64(b"+/-_").as_deref(), Ok(&[0xfb, 0xff, 0xbf][..]));
         assert!(decode_base64(b"Zm*v").is_err());
-        assert_eq!(&*percent_decoded("a%20b%2Fc%zz%4"), b"a b/c%zz%4");
+        assert_eq!(decode_data_uri(",a%20b%2Fc%zz%4").as_deref(), Ok(&b"a b/c%zz%4"[..]));
         assert_eq!(decode_data_uri("text/plain,a%20b").as_deref(), Ok(&b"a b"[..]));
         assert_eq!(decode_data_uri("application/octet-stream;base64,Zm9v").as_deref(), Ok(&b"foo"[..]));
         assert!(decode_data_uri("application/octet-stream;base64").is_err());
