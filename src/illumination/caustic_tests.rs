@@ -1,6 +1,6 @@
 //! Light by way of mirrors and glass against closed forms.
 
-use super::rooms::{Room, glass};
+use super::test_rooms::{Room, glass};
 use super::*;
 use crate::random::Random;
 use crate::scene::Scene;

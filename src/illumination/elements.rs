@@ -73,7 +73,7 @@ pub(crate) struct Element {
     /// Which side.
     pub(crate) front: bool,
     /// Whether something cuts through it, so that its vertices do not speak for all of it.
-    pub(crate) doubtful: bool,
+    pub(crate) cut: bool,
 }
 
 impl Element {
@@ -120,7 +120,7 @@ impl Elements {
         let mut senders = Senders { of: vec![NONE; self.elements.len()], all: Vec::new() };
         for e in self.leaves() {
             senders.of[e as usize] = senders.all.len() as u32;
-            if self.elements[e as usize].doubtful {
+            if self.elements[e as usize].cut {
                 senders.all.extend((0..3).map(|k| Sender { element: e, corner: Some(k) }));
             } else {
                 senders.all.push(Sender { element: e, corner: None });
@@ -134,7 +134,7 @@ impl Elements {
     pub(crate) fn sender(&self, bvh: &SceneBvh, senders: &Senders, e: u32, weights: [f32; 3]) -> Option<u32> {
         let first = senders.of[e as usize];
         let element = &self.elements[e as usize];
-        if !element.doubtful {
+        if !element.cut {
             return Some(first);
         }
         let corners = self.corners(e as usize);

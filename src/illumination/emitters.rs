@@ -45,11 +45,11 @@ pub(crate) struct ShadowRays {
     /// Second set for an emitter that the first one saw in part.
     pub(crate) penumbra: u32,
     /// Emitters, one bit each, that are known to be seen whole.
-    pub(crate) clear: Clear,
+    pub(crate) clear: VisibleEmitters,
 }
 
 /// Emitters that a piece of a surface sees whole, one bit each for the first ones.
-pub(crate) type Clear = u16;
+pub(crate) type VisibleEmitters = u16;
 
 impl Emitters {
     pub(crate) fn new(scene: &Scene, form_factor: FormFactor) -> Self {
@@ -94,7 +94,7 @@ impl Emitters {
     }
 
     /// Which emitters every point of a flat piece of a surface sees whole.
-    pub(crate) fn clear(&self, bvh: &SceneBvh, piece: &[DVec3], facing: DVec3) -> Clear {
+    pub(crate) fn clear(&self, bvh: &SceneBvh, piece: &[DVec3], facing: DVec3) -> VisibleEmitters {
         let tolerance = 2.0 * bvh.offset();
         let clear = |emitter: &Emitter| {
             let above = (piece[0] - emitter.corners[0]).dot(emitter.normal) > 0.0;
@@ -102,7 +102,7 @@ impl Emitters {
             emitter.textured.is_none()
                 && Shaft::new(piece, facing, &emitter.corners, shining, tolerance).is_some_and(|s| s.is_clear(bvh))
         };
-        let first = self.polygons.iter().take(Clear::BITS as usize).enumerate();
+        let first = self.polygons.iter().take(VisibleEmitters::BITS as usize).enumerate();
         first.filter(|(_, emitter)| clear(emitter)).fold(0, |bits, (index, _)| bits | 1 << index)
     }
 
@@ -132,7 +132,7 @@ impl Emitters {
         }
         for &(index, factor) in &seen[..count] {
             let emitter = &self.polygons[index];
-            if index < Clear::BITS as usize && rays.clear >> index & 1 == 1 {
+            if index < VisibleEmitters::BITS as usize && rays.clear >> index & 1 == 1 {
                 sum += emitter.mean_radiance * factor as f32;
                 continue;
             }

@@ -162,7 +162,7 @@ fn hull(points: Vec<DVec3>, normal: DVec3) -> Vec<DVec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::illumination::rooms::Room;
+    use crate::illumination::test_rooms::Room;
     use glam::Vec3;
 
     #[test]

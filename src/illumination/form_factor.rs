@@ -84,42 +84,6 @@ fn edge_sum(normal: DVec3, spokes: impl Iterator<Item = DVec3> + Clone) -> f64 {
     (sum / TAU).abs()
 }
 
-/// Form factor between two polygons that see each other freely: the mean of [`point_to_polygon`] over `from`, by
-/// Gauss–Legendre quadrature (4 × 4 nodes) on `cells`² cells of each triangle of its fan.
-///
-/// An oracle for tests, not for scenes: obstacles are ignored; the error falls with cells⁻³ or faster where the
-/// polygons touch, and with cells⁻⁸ where they do not.
-#[cfg(test)]
-pub(crate) fn polygon_to_polygon(from: &[DVec3], to: &[DVec3], cells: usize) -> f64 {
-    const NODES: [(f64, f64); 4] = [
-        (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
-        (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
-        (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
-        (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
-    ];
-    let (mut weighted, mut total) = (0.0, 0.0);
-    for i in 1..from.len().saturating_sub(1) {
-        let (a, b, c) = (from[0], from[i], from[i + 1]);
-        let cross = (b - a).cross(c - a);
-        let (area, normal) = (0.5 * cross.length(), cross.normalize_or_zero());
-        let mut mean = 0.0;
-        for row in 0..cells * cells {
-            let corner = ((row / cells) as f64, (row % cells) as f64);
-            for (x, wx) in NODES {
-                for (y, wy) in NODES {
-                    // (s, t) ↦ a + s(b−a) + st(c−b) covers the triangle with Jacobian 2·area·s.
-                    let (s, t) = ((corner.0 + x) / cells as f64, (corner.1 + y) / cells as f64);
-                    let point = a + (b - a) * s + (c - b) * (s * t);
-                    mean += wx * wy * 2.0 * s * point_to_polygon(point, normal, to);
-                }
-            }
-        }
-        weighted += area * mean / (cells * cells) as f64;
-        total += area;
-    }
-    if total > 0.0 { weighted / total } else { 0.0 }
-}
-
 /// Form factor from a surface element to a small area: cosθ₁cosθ₂·area/(π r²) [1], zero where either looks away.
 pub(crate) fn point_to_element(point: DVec3, normal: DVec3, at: DVec3, facing: DVec3, area: f64) -> f64 {
     let span = at - point;
@@ -131,6 +95,41 @@ pub(crate) fn point_to_element(point: DVec3, normal: DVec3, at: DVec3, facing: D
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Form factor between two polygons that see each other freely: the mean of [`point_to_polygon`] over `from`, by
+    /// Gauss–Legendre quadrature (4 × 4 nodes) on `cells`² cells of each triangle of its fan.
+    ///
+    /// An oracle for tests, not for scenes: obstacles are ignored; the error falls with cells⁻³ or faster where the
+    /// polygons touch, and with cells⁻⁸ where they do not.
+    fn polygon_to_polygon(from: &[DVec3], to: &[DVec3], cells: usize) -> f64 {
+        const NODES: [(f64, f64); 4] = [
+            (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
+            (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
+            (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
+            (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
+        ];
+        let (mut weighted, mut total) = (0.0, 0.0);
+        for i in 1..from.len().saturating_sub(1) {
+            let (a, b, c) = (from[0], from[i], from[i + 1]);
+            let cross = (b - a).cross(c - a);
+            let (area, normal) = (0.5 * cross.length(), cross.normalize_or_zero());
+            let mut mean = 0.0;
+            for row in 0..cells * cells {
+                let corner = ((row / cells) as f64, (row % cells) as f64);
+                for (x, wx) in NODES {
+                    for (y, wy) in NODES {
+                        // (s, t) ↦ a + s(b−a) + st(c−b) covers the triangle with Jacobian 2·area·s.
+                        let (s, t) = ((corner.0 + x) / cells as f64, (corner.1 + y) / cells as f64);
+                        let point = a + (b - a) * s + (c - b) * (s * t);
+                        mean += wx * wy * 2.0 * s * point_to_polygon(point, normal, to);
+                    }
+                }
+            }
+            weighted += area * mean / (cells * cells) as f64;
+            total += area;
+        }
+        if total > 0.0 { weighted / total } else { 0.0 }
+    }
 
     /// An axis-aligned rectangle: `corner`, then two edge vectors.
     fn rectangle(corner: [f64; 3], u: [f64; 3], v: [f64; 3]) -> [DVec3; 4] {

@@ -1,7 +1,7 @@
 //! Images of lamps in flat mirrors, against closed forms.
 
 use super::form_factor::{point_to_element, point_to_polygon};
-use super::rooms::Room;
+use super::test_rooms::Room;
 use super::{Illumination, IlluminationSettings, Surface};
 use crate::progress::Progress;
 use crate::random::Random;

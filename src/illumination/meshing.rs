@@ -44,7 +44,7 @@ impl Elements {
                 let triangle = &scene.triangles[index as usize];
                 let real = triangle.area() > 0.0 && triangle.positions.iter().all(|p| p.is_finite());
                 if real && lit(index, front) {
-                    mesh.plant(index, front);
+                    mesh.add_root(index, front);
                 }
             }
         }
@@ -63,12 +63,12 @@ impl Elements {
                 break;
             }
         }
-        mesh.doubt(bvh);
+        mesh.mark_cut(bvh);
         mesh.shared = HashMap::new();
         mesh
     }
 
-    fn plant(&mut self, index: u32, front: bool) {
+    fn add_root(&mut self, index: u32, front: bool) {
         let triangle = self.scene.triangles[index as usize].clone();
         let side = if front { 1.0 } else { -1.0 };
         let facing = self.facing(index, front);
@@ -80,7 +80,7 @@ impl Elements {
         let rotation = self.longest_first(corners);
         let barycentric = rotated([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], rotation);
         let corners = rotated(corners, rotation);
-        let root = self.push(Element { corners, barycentric, triangle: index, front, doubtful: false });
+        let root = self.push(Element { corners, barycentric, triangle: index, front, cut: false });
         self.count(root, 1.0);
         self.roots[index as usize][usize::from(!front)] = root;
         self.root_rotations[index as usize] = rotation;
@@ -141,15 +141,15 @@ impl Elements {
         }
     }
 
-    fn split_where(&mut self, fineness: Fineness, wish: impl Fn(&Self, usize) -> bool + Copy) {
-        while self.split_where_once(fineness, wish) {}
+    fn split_where(&mut self, fineness: Fineness, chosen: impl Fn(&Self, usize) -> bool + Copy) {
+        while self.split_where_once(fineness, chosen) {}
     }
 
-    /// Splits the leaves that wish it; whether there were any.
-    fn split_where_once(&mut self, fineness: Fineness, wish: impl Fn(&Self, usize) -> bool) -> bool {
-        let chosen: Vec<u32> = self.leaves().filter(|&e| wish(self, e as usize)).collect();
+    /// Splits the leaves for which `chosen` holds; whether there were any.
+    fn split_where_once(&mut self, fineness: Fineness, chosen: impl Fn(&Self, usize) -> bool) -> bool {
+        let leaves: Vec<u32> = self.leaves().filter(|&e| chosen(self, e as usize)).collect();
         let mut any = false;
-        for e in chosen {
+        for e in leaves {
             if self.vertices.len() < fineness.most_vertices {
                 self.split(e);
                 any = true;
@@ -203,7 +203,7 @@ impl Elements {
     }
 
     /// Finds the leaves that something cuts through or borders on, or that reach into a body.
-    fn doubt(&mut self, bvh: &SceneBvh) {
+    fn mark_cut(&mut self, bvh: &SceneBvh) {
         let leaves: Vec<u32> = self.leaves().collect();
         let mut around: Vec<Vec<u32>> = vec![Vec::new(); self.vertices.len()];
         for &e in &leaves {
@@ -219,8 +219,8 @@ impl Elements {
             let [a, b, c] = self.corners(e as usize);
             (a + b + c) / 3.0 + side(e) * (LIFT * self.longest_edge(e as usize))
         };
-        // A sheet that stands right on a vertex is met between the elements round it, not inside any of them. Over a
-        // bend elements need not see each other.
+        // A sheet that stands right on a vertex is met between the elements round it, not inside any of them. Across a
+        // crease elements need not see each other.
         let torn: Vec<bool> = around
             .par_iter()
             .map(|leaves| {
@@ -229,7 +229,7 @@ impl Elements {
                 rest.iter().filter(flat).any(|&e| bvh.occluded(lifted_middle(first), lifted_middle(e)))
             })
             .collect();
-        let doubtful: Vec<bool> = leaves
+        let cut: Vec<bool> = leaves
             .par_iter()
             .map(|&e| {
                 let element = &self.elements[e as usize];
@@ -244,8 +244,8 @@ impl Elements {
                 [(a, b), (b, c), (c, a)].into_iter().any(|(p, q)| bvh.occluded(p, q))
             })
             .collect();
-        for (&e, doubtful) in leaves.iter().zip(doubtful) {
-            self.elements[e as usize].doubtful = doubtful;
+        for (&e, cut) in leaves.iter().zip(cut) {
+            self.elements[e as usize].cut = cut;
         }
     }
 }

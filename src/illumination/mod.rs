@@ -38,19 +38,19 @@ mod images;
 mod images_tests;
 mod lamp_image;
 mod meshing;
-#[cfg(test)]
-pub(crate) mod oracle;
 mod patches;
 pub(crate) mod paths;
 mod photons;
 mod radiosity;
 pub(crate) mod reflection;
-#[cfg(test)]
-pub(crate) mod rooms;
 mod sampling;
 mod shading;
 mod shaft;
 mod surface;
+#[cfg(test)]
+pub(crate) mod test_oracle;
+#[cfg(test)]
+pub(crate) mod test_rooms;
 #[cfg(test)]
 mod tests;
 
@@ -64,7 +64,7 @@ use crate::random::Random;
 use crate::scene::bvh::SceneBvh;
 use caustics::Caustics;
 use elements::{Elements, Senders};
-use emitters::{Clear, Emitters};
+use emitters::{Emitters, VisibleEmitters};
 use glam::Vec3;
 use images::Images;
 use lamp_image::Lamps;
@@ -144,6 +144,7 @@ impl Default for IlluminationSettings {
 
 /// Where the light went [W], linear RGB.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Energy {
     /// Emitted by surfaces, and what arrives from punctual lights.
     pub emitted: Vec3,
@@ -164,6 +165,7 @@ impl Energy {
 
 /// What computing the light took and gave.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct IlluminationReport {
     /// Emitting polygons that are sampled directly.
     pub emitters: usize,
@@ -199,7 +201,7 @@ pub struct Illumination {
     images: Images,
     caustics: Caustics,
     /// Emitters that each leaf of the mesh sees whole.
-    clear: Vec<Clear>,
+    clear: Vec<VisibleEmitters>,
     senders: Senders,
     /// Radiance that leaves each sender, without sampled emission.
     leaving: Vec<Vec3>,
@@ -319,7 +321,7 @@ impl Illumination {
 }
 
 /// Which emitters each leaf of the mesh sees whole.
-fn clear_views(lamps: Lamps, mesh: &Elements) -> Vec<Clear> {
+fn clear_views(lamps: Lamps, mesh: &Elements) -> Vec<VisibleEmitters> {
     let each = mesh.elements.par_iter().enumerate().map(|(index, element)| {
         let facing = mesh.facing(element.triangle, element.front);
         let leaf = mesh.is_leaf(index as u32);

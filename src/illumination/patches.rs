@@ -2,7 +2,7 @@
 
 use super::IlluminationSettings;
 use super::elements::{Elements, Senders};
-use super::emitters::{Clear, Emitters, ShadowRays};
+use super::emitters::{Emitters, ShadowRays, VisibleEmitters};
 use super::images::Images;
 use super::lamp_image::Lamps;
 use super::photons::Photon;
@@ -34,7 +34,7 @@ impl Patches {
         images: &Images,
         mesh: &Elements,
         senders: &Senders,
-        clear: &[Clear],
+        clear: &[VisibleEmitters],
         settings: &IlluminationSettings,
         progress: &Progress,
     ) -> Result<Self> {

@@ -169,6 +169,7 @@ impl Transport {
 
 /// What the solver did.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Convergence {
     /// Applications of the transport.
     pub iterations: usize,

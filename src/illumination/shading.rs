@@ -9,7 +9,7 @@ use crate::scene::bvh::{Hit, Ray};
 use glam::{DVec3, Vec3};
 
 /// Rays with which a point gathers where its element is cut through.
-const DOUBT_RAYS: u32 = 256;
+const CUT_RAYS: u32 = 256;
 
 /// Where a hit lies in the mesh.
 #[derive(Clone, Copy)]
@@ -58,11 +58,11 @@ impl Illumination {
             None if place.element == NONE => return Vec3::ZERO,
             None => {
                 let element = &self.mesh.elements[place.element as usize];
-                if !element.doubtful {
+                if !element.cut {
                     let corners = element.corners.iter().zip(place.weights);
                     return corners.map(|(&v, w)| self.irradiance[v as usize] * w).sum();
                 }
-                DOUBT_RAYS
+                CUT_RAYS
             }
         };
         let images = self.images.weak(self.lamps(), surface.shading_point(self.bvh().offset()), random);

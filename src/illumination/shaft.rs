@@ -66,7 +66,7 @@ impl Shaft {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::illumination::rooms::Room;
+    use crate::illumination::test_rooms::Room;
     use crate::random::Random;
     use crate::scene::Material;
     use glam::Vec3;

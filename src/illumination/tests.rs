@@ -1,6 +1,6 @@
 //! Light against closed forms.
 
-use super::rooms::Room;
+use super::test_rooms::Room;
 use super::*;
 use crate::random::Random;
 use crate::scene::bvh::Ray;

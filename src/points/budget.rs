@@ -58,6 +58,7 @@ pub enum Limit {
 
 /// A grid of rays and why it is this one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Rays {
     /// Across and down.
     pub size: [u32; 2],

@@ -2,8 +2,8 @@
 
 use super::eye::Eye;
 use super::trace::{MirrorDepth, TraceSettings, trace};
-use crate::illumination::oracle::Oracle;
-use crate::illumination::rooms::{Room, glass};
+use crate::illumination::test_oracle::Oracle;
+use crate::illumination::test_rooms::{Room, glass};
 use crate::illumination::{Illumination, IlluminationSettings};
 use crate::progress::Progress;
 use crate::random::Random;

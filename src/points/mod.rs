@@ -33,6 +33,8 @@ pub mod images;
 #[cfg(test)]
 mod odd_tests;
 pub mod placement;
+#[cfg(test)]
+mod placement_tests;
 pub mod ply;
 mod settings;
 pub mod slices;

@@ -2,7 +2,7 @@
 
 use super::eye_tests::{agrees, white_box};
 use super::trace::{TraceSettings, Traced, trace};
-use crate::illumination::rooms::{Room, glass};
+use crate::illumination::test_rooms::{Room, glass};
 use crate::illumination::{Illumination, IlluminationSettings};
 use crate::progress::Progress;
 use crate::scene::{Camera, Material, Scene, SceneBvh};

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 
 /// What the light of a slice is taken from.
 #[derive(Clone, Debug)]
-pub enum SliceSource {
+enum SliceSource {
     /// A picture cut by its depth map.
     Depth(RgbDepth),
     /// Pictures sharp at one depth each, that fill the window there; z [m], farthest first.

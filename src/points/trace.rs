@@ -65,6 +65,7 @@ impl Traced {
 
 /// What tracing took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct TraceReport {
     /// Rays whose light was computed: one per pixel and the sub-rays of edges.
     pub rays: u64,
@@ -190,7 +191,7 @@ pub(super) fn neighbours(pixel: usize, width: usize, count: usize) -> impl Itera
 mod tests {
     use super::*;
     use crate::illumination::IlluminationSettings;
-    use crate::illumination::rooms::Room;
+    use crate::illumination::test_rooms::Room;
     use crate::scene::{Material, Scene, SceneBvh};
 
     fn traced(scene: &Scene, camera: &Camera, settings: &TraceSettings) -> Traced {

@@ -25,6 +25,7 @@ pub enum WhitePoint {
 
 /// Where white lies, and what of the light is brighter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct WhiteLevel {
     /// What pictures show as white [W/(m² sr)].
     pub white: f32,

@@ -7,7 +7,7 @@ use super::*;
 use crate::error::Error;
 use crate::field::{Complex32, Complex64, Fft2};
 use crate::hologram::InstructionSet;
-use crate::illumination::rooms::Room;
+use crate::illumination::test_rooms::Room;
 use crate::illumination::{Illumination, IlluminationSettings};
 use crate::points::PointSource;
 use crate::progress::Progress;

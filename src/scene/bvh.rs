@@ -175,7 +175,7 @@ impl SceneBvh {
 
     /// The same for a ray that starts on a surface with unit geometric `normal`: traversal starts off the surface by
     /// [`SceneBvh::offset`], on the side to which the ray goes, but the distance is measured from the ray's own origin.
-    pub fn nearest_leaving(&self, ray: &Ray, normal: DVec3, sides: Sides) -> Option<Hit> {
+    pub(crate) fn nearest_leaving(&self, ray: &Ray, normal: DVec3, sides: Sides) -> Option<Hit> {
         let side = self.offset.copysign(normal.dot(ray.direction));
         let lifted = Ray { origin: ray.origin + normal * side, direction: ray.direction };
         self.meet(&lifted, 0.0, f64::INFINITY, sides).map(|meeting| self.refined(ray, &meeting))
@@ -212,7 +212,7 @@ impl SceneBvh {
     }
 
     /// Whether `chosen` holds for any triangle in boxes (lowest and highest corner) for which `entered` holds [m].
-    pub fn any_triangle(&self, entered: impl Fn(DVec3, DVec3) -> bool, chosen: impl Fn(u32) -> bool) -> bool {
+    pub(crate) fn any_triangle(&self, entered: impl Fn(DVec3, DVec3) -> bool, chosen: impl Fn(u32) -> bool) -> bool {
         if self.leaves.is_empty() {
             return false;
         }

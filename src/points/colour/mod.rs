@@ -52,6 +52,7 @@ pub struct Drive {
 
 /// What the lasers' gamut did to a cloud.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Gamut {
     /// Points whose colour the lasers cannot make.
     pub outside_points: usize,

@@ -2,7 +2,6 @@
 
 use super::Clip;
 use super::document::{Document, choose};
-use super::nodes::node_name;
 use crate::error::Result;
 use glam::{DMat4, DQuat, DVec3};
 use gltf::json;
@@ -46,7 +45,7 @@ impl Pose {
             let matrix = node.matrix.map(|m| DMat4::from_cols_array(&m.map(f64::from)));
             let local = matrix.unwrap_or_else(|| rest.matrix());
             if !local.is_finite() {
-                return Err(document.error(format!("{} has a transform that is not finite", node_name(document, i))));
+                return Err(document.error(format!("{} has a transform that is not finite", document.node_name(i))));
             }
             parent_from_node.push(local);
             parts.push(rest);
@@ -58,7 +57,7 @@ impl Pose {
             pose.animate(document, animation, &mut parts, time)?;
         }
         if let Some(i) = pose.weights.iter().position(|w| !w.iter().all(|x| x.is_finite())) {
-            let name = node_name(document, i);
+            let name = document.node_name(i);
             return Err(document.error(format!("{name} has morph weights that are not finite")));
         }
         Ok(pose)

@@ -2,7 +2,7 @@
 
 use super::Choice;
 use super::document::{Document, choose};
-use super::nodes::{Nodes, node_name};
+use super::nodes::Nodes;
 use crate::error::Result;
 use crate::scene::{Camera, Projection, Triangle, Warning};
 use glam::{DMat3, DMat4, DVec3};
@@ -32,7 +32,7 @@ pub(super) fn read(
     for &node in &nodes.shown {
         let Some(index) = document.root.nodes[node].camera else { continue };
         let json = document.get(index, "a node's camera")?;
-        let what = format!("the camera of {}", node_name(document, node));
+        let what = format!("the camera of {}", document.node_name(node));
         let (pose, mirrored) = rigid(nodes.world_from_node[node])
             .ok_or_else(|| document.error(format!("{what} has no direction; its node's scale is zero")))?;
         if mirrored {

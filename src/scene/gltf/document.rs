@@ -68,6 +68,11 @@ impl Document {
         Error::input(&self.path, what)
     }
 
+    /// What a node is called in messages.
+    pub(super) fn node_name(&self, node: usize) -> String {
+        called("node", node, self.root.nodes.get(node).and_then(|n| n.name.as_deref()))
+    }
+
     /// The object with this index; `what` names it in the error if the file has none.
     pub(super) fn get<T>(&self, index: json::Index<T>, what: &str) -> Result<&T>
     where

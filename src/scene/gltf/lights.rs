@@ -4,7 +4,7 @@ use super::LoadOptions;
 use super::cameras::rigid;
 use super::document::Document;
 use super::meshes::UsedMaterials;
-use super::nodes::{Nodes, node_name};
+use super::nodes::Nodes;
 use crate::error::Result;
 use crate::scene::{LightKind, Material, PunctualLight, Scene, TextureRef, Warning};
 use glam::{DVec3, Vec3};
@@ -28,7 +28,7 @@ pub(super) fn read(document: &Document, nodes: &Nodes) -> Result<Vec<PunctualLig
     for &node in &nodes.shown {
         let extension = document.root.nodes[node].extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
         let Some(extension) = extension else { continue };
-        let what = format!("the light of {}", node_name(document, node));
+        let what = format!("the light of {}", document.node_name(node));
         let light = document.get(extension.light, &what)?;
         let world_from_node = nodes.world_from_node[node];
         let (pose, _) = rigid(world_from_node)
@@ -70,8 +70,8 @@ fn kind(document: &Document, light: &Light, what: &str) -> Result<LightKind> {
     }
 }
 
-/// Sees to it that the scene is lit: a file without any light gets the default of [`super::load`], as does one for which
-/// it is wanted; one whose lights have all been turned down to zero is refused, since that is hardly what was meant.
+/// Makes sure that the scene is lit. A file without any light gets that of [`super::load`], and so does any file on
+/// request. A file whose lights are all turned down to zero is refused: that is hardly what was meant.
 pub(super) fn ensure_light(
     document: &Document,
     scene: &mut Scene,

@@ -2,7 +2,7 @@
 
 use super::animation::Pose;
 use super::document::{Document, called};
-use super::nodes::{Nodes, node_name};
+use super::nodes::Nodes;
 use super::primitives::{Primitive, primitive_size, read_primitive};
 use crate::error::Result;
 use crate::scene::{Triangle, Warning};
@@ -62,7 +62,7 @@ pub(super) fn triangles(
                 used.push(primitive.material);
                 used.len() - 1
             });
-            let name = || node_name(document, node);
+            let name = || document.node_name(node);
             let before = triangles.len();
             for &corners in &primitive.triangles {
                 let triangle = placement.triangle(document, primitive, &pose.weights[node], corners, &name)?;

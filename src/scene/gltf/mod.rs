@@ -97,7 +97,7 @@ pub struct LoadOptions {
     pub clip: Clip,
     /// Time in the clip [s]; before its first or after its last key the pose of that key is held.
     pub time: f64,
-    /// Whether the light that a file without any gets is added to the file's own.
+    /// Whether the default light of an unlit file is added to the lights of this one.
     pub viewer_light: bool,
     /// A file without a camera or a light is given one that suits this box (low, high) [m]. `None`: the box of the scene
     /// as it is posed. An animation that one camera is to see gives the box of all its poses.

@@ -2,7 +2,7 @@
 
 use super::Choice;
 use super::animation::Pose;
-use super::document::{Document, called, choose};
+use super::document::{Document, choose};
 use crate::error::Result;
 use glam::DMat4;
 use gltf::json;
@@ -22,7 +22,7 @@ impl Nodes {
         let parents = parents(document)?;
         let roots = || (0..nodes.len()).filter(|&n| parents[n].is_none()).collect();
         let twice = |node| {
-            let name = node_name(document, node);
+            let name = document.node_name(node);
             document.error(format!("{name} stands twice in the scene; glTF requires a tree"))
         };
 
@@ -36,7 +36,7 @@ impl Nodes {
             let above = parents[node].map_or(DMat4::IDENTITY, |parent| world_from_node[parent]);
             world_from_node[node] = above * pose.parent_from_node[node];
             if !world_from_node[node].is_finite() {
-                return Err(document.error(format!("{} has a transform that is not finite", node_name(document, node))));
+                return Err(document.error(format!("{} has a transform that is not finite", document.node_name(node))));
             }
         }
 
@@ -55,11 +55,6 @@ impl Nodes {
     }
 }
 
-/// How a node is called in messages.
-pub(super) fn node_name(document: &Document, node: usize) -> String {
-    called("node", node, document.root.nodes.get(node).and_then(|n| n.name.as_deref()))
-}
-
 fn parents(document: &Document) -> Result<Vec<Option<usize>>> {
     let nodes = &document.root.nodes;
     let mut parents = vec![None; nodes.len()];
@@ -67,7 +62,7 @@ fn parents(document: &Document) -> Result<Vec<Option<usize>>> {
         for &child in node.children.iter().flatten() {
             document.get(child, "a node's child list")?;
             if parents[child.value()].replace(parent).is_some() {
-                let name = node_name(document, child.value());
+                let name = document.node_name(child.value());
                 return Err(document.error(format!("{name} has two parents; glTF requires a tree")));
             }
         }
