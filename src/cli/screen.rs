@@ -157,7 +157,7 @@ pub(super) fn show_settings(args: &ShowArgs) -> Result<Option<ShowSettings>> {
     let Some(name) = &args.monitor else { return Ok(None) };
     let hold = match args.hold {
         Some(hold) if hold.is_finite() && (0.0..1e9).contains(&hold) => Some(Duration::from_secs_f64(hold)),
-        Some(hold) => return Err(Error::parameter("hold", format!("{hold} is not a number of seconds"))),
+        Some(hold) => return Err(Error::out_of_range("hold", hold, "must be 0 to 1e9 seconds")),
         None => None,
     };
     let window = window_settings(args.present, args.allow_altered_levels, args.trigger_patch.as_deref())?;

@@ -164,7 +164,7 @@ fn idle_frame(text: &str, panel: &Setup, driver: &Driver, report: &mut Report) -
     if let Ok(level) = text.parse::<u16>() {
         return driver.flat(level).map_err(|_| {
             let highest = panel.profile.levels() - 1;
-            Error::parameter("--idle", format!("{level} is above {highest}, the panel's highest level"))
+            Error::out_of_range("--idle", level, format!("must be 0 to {highest}, the panel's highest level"))
         });
     }
     let (frame, warnings) = Frame::read(Path::new(text), Some(&panel.profile), Some(panel.wavelength))?;

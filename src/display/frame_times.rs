@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 const MOST_TIMES: usize = 65_536;
 
 /// When one frame was due and came. Times are from the first frame [s], on a monotonic clock.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct FrameTime {
     /// Running number, from 0.
     pub number: u64,
@@ -70,17 +70,7 @@ pub(super) struct FrameTimes<'a> {
 impl<'a> FrameTimes<'a> {
     /// Begins with the first frame, made at `ready` [s].
     pub(super) fn begin(ready: f64, settle: f64, told: &'a mut dyn FnMut(&FrameTime)) -> Self {
-        let first = FrameTime {
-            number: 0,
-            due: 0.0,
-            ready,
-            presented: 0.0,
-            settled: None,
-            missed: 0,
-            starved: false,
-            taken: true,
-            vertical_blank: None,
-        };
+        let first = FrameTime { ready, taken: true, ..FrameTime::default() };
         Self {
             told,
             settle,
@@ -107,22 +97,13 @@ impl<'a> FrameTimes<'a> {
         self.last = time.presented;
     }
 
-    /// Tells of the frames that have settled by `now`.
-    pub(super) fn tell_settled(&mut self, now: f64) {
-        self.tell(now, false);
-    }
-
-    /// Tells of all frames: one that has not settled by `now` is about to be replaced.
-    pub(super) fn tell_all(&mut self, now: f64) {
-        self.tell(now, true);
-    }
-
-    fn tell(&mut self, now: f64, all: bool) {
+    /// Tells of the frames that have settled by `now`; of all where what has not is about to be `replaced`.
+    pub(super) fn tell(&mut self, now: f64, replaced: bool) {
         while let Some(mut time) = self.untold.pop_front() {
             let settles = time.presented + self.settle;
             if settles <= now && time.taken {
                 time.settled = Some(settles);
-            } else if all || !time.taken {
+            } else if replaced || !time.taken {
                 self.statistics.unsettled += u64::from(time.taken);
             } else {
                 self.untold.push_front(time);

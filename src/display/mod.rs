@@ -65,7 +65,7 @@ pub use frame::DisplayFrame;
 pub use frame_times::{FrameStatistics, FrameTime};
 pub use keys::{Key, KeyPress};
 pub use monitor::{Gamma, Monitor, ScanOut};
-pub use operator::{OperatorChoice, OperatorStanding, OperatorWindow};
+pub use operator::{OperatorChoice, OperatorWindow};
 pub use panel_loop::{OnAbsence, PanelLoop, ShowEnd, ShowSettings, Turn, WindowReport};
 pub use play::{PlayReport, PlaySettings, play};
 pub use presenter::Presenter;

@@ -147,11 +147,6 @@ impl Monitor {
     pub(super) fn rectangle(&self) -> Rectangle {
         Rectangle { x: self.x, y: self.y, width: self.width, height: self.height }
     }
-
-    /// Whether it stands at the same place with the same size: a window made for `other` still fits.
-    pub fn same_place(&self, other: &Self) -> bool {
-        self.rectangle() == other.rectangle()
-    }
 }
 
 impl fmt::Display for Monitor {

@@ -82,7 +82,7 @@ pub struct OperatorWindow {
 
 /// How it stands with the operator's window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OperatorStanding {
+pub(super) enum OperatorStanding {
     /// It is there.
     Shown,
     /// A key ended the show, or the window was closed.
@@ -96,7 +96,12 @@ impl OperatorWindow {
     ///
     /// # Errors
     /// [`Error::Display`] when no window can be made or drawn into, or it comes to stand on the panel's monitor.
-    pub fn open(display: &mut Display, home: &Monitor, panel: &Monitor, first: &Arc<DisplayFrame>) -> Result<Self> {
+    pub(super) fn open(
+        display: &mut Display,
+        home: &Monitor,
+        panel: &Monitor,
+        first: &Arc<DisplayFrame>,
+    ) -> Result<Self> {
         let (width, height) = (first.width(), first.height());
         let (size, place) = (PhysicalSize::new(width, height), corner(home, first));
         let native = NativeWindow::create(display, width, height, |_| {
@@ -119,11 +124,6 @@ impl OperatorWindow {
         Ok(Self { surface, native, home, panel, last, strayed: 0 })
     }
 
-    /// The monitor that it was opened on.
-    pub fn monitor(&self) -> &Monitor {
-        &self.home
-    }
-
     /// Shows a picture of the window's size from now on.
     ///
     /// # Errors
@@ -139,7 +139,7 @@ impl OperatorWindow {
     ///
     /// # Errors
     /// [`Error::Display`] when the connection to the window system is lost.
-    pub fn attend(&mut self) -> Result<OperatorStanding> {
+    pub(super) fn attend(&mut self) -> Result<OperatorStanding> {
         let events = self.native.events();
         if events.end {
             return Ok(OperatorStanding::Ended);
@@ -159,7 +159,7 @@ impl OperatorWindow {
     }
 
     /// Keys pressed in it since the last call.
-    pub fn keys(&self) -> Vec<KeyPress> {
+    pub(super) fn keys(&self) -> Vec<KeyPress> {
         self.native.keys()
     }
 

@@ -174,7 +174,7 @@ impl<'a> PanelLoop<'a> {
     ///
     /// # Errors
     ///
-    /// Those of [`OperatorWindow::open`].
+    /// [`Error::Display`] when no window can be made or drawn into, or it does not come to stand in its size.
     pub fn open_operator(&mut self, home: &Monitor, first: &Arc<DisplayFrame>) -> Result<()> {
         let panel = self.panel.monitor().clone();
         self.operator = Some(OperatorWindow::open(self.display, home, &panel, first)?);

@@ -52,8 +52,8 @@ pub struct PlayReport {
 ///
 /// # Errors
 ///
-/// Those of [`super::PanelWindow::open`]; the first error among `frames`; [`Error::Parameter`] for an empty sequence or a
-/// rate outside 0.001 to 10,000 Hz; [`Error::Interrupted`] when it was stopped before the first frame.
+/// Those of [`super::PanelWindow::open`]; the first error among `frames`; [`Error::Parameter`] for an empty sequence,
+/// [`Error::OutOfRange`] for a rate outside 0.001 to 10,000 Hz; [`Error::Interrupted`] when it was stopped before the first frame.
 pub fn play<F: Into<Arc<DisplayFrame>>>(
     display: &mut Display,
     frames: impl Iterator<Item = Result<F>> + Send,
@@ -63,10 +63,10 @@ pub fn play<F: Into<Arc<DisplayFrame>>>(
 ) -> Result<PlayReport> {
     if let Some(rate) = settings.rate.filter(|rate| !RATES.contains(rate)) {
         let (least, most) = (RATES.start(), RATES.end());
-        return Err(Error::parameter("fps", format!("{rate} frames per second; give {least} to {most}")));
+        return Err(Error::out_of_range("fps", rate, format!("must be {least} to {most} frames per second")));
     }
     if !(settings.settle.is_finite() && settings.settle >= 0.0) {
-        return Err(Error::parameter("settle", format!("{} s is no time to settle", settings.settle)));
+        return Err(Error::out_of_range("settle", settings.settle, "must be a time of 0 s or more"));
     }
     std::thread::scope(|scope| {
         let (sender, receiver) = sync_channel(settings.ahead.max(1));
@@ -184,7 +184,7 @@ impl<'a> Player<'a> {
             let vertical_blank = self.panel.panel_mut().wait_for_vertical_blank(limit)?;
             let handed_over = self.now();
             // What is not settled now never will be.
-            self.times.tell_all(handed_over);
+            self.times.tell(handed_over, true);
             let shown = self.panel.panel_mut().present(&ready.frame)?;
             let missed = ((handed_over - due) / self.refresh).round().max(0.0) as u64;
             let time = FrameTime {
@@ -199,12 +199,12 @@ impl<'a> Player<'a> {
                 vertical_blank,
             };
             self.times.add(time, handed_over);
-            self.times.tell_settled(self.now());
+            self.times.tell(self.now(), false);
             // Each frame has its full time on the panel: after a late one, the next does not hurry. At the monitor's own
             // rate its blanks set the time.
             due = if missed > 0 || self.at_refresh { handed_over } else { due } + self.period;
         };
-        self.times.tell_all(self.now());
+        self.times.tell(self.now(), true);
         Ok(PlayReport { window: self.panel.close(end)?, times: self.times.statistics() })
     }
 
@@ -244,7 +244,7 @@ impl<'a> Player<'a> {
     /// Waits until `due` (none: for ever), dealing with the window's events.
     fn wait(&mut self, due: Option<f64>) -> Result<Waited> {
         loop {
-            self.times.tell_settled(self.now());
+            self.times.tell(self.now(), false);
             let left = due.map_or(LONGEST_TURN, |due| Duration::from_secs_f64((due - self.now()).max(0.0)));
             match self.panel.turn(left.saturating_sub(SLEPT).min(LONGEST_TURN))? {
                 Turn::Ended(end) => return Ok(Waited::End(end)),

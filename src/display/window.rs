@@ -240,7 +240,7 @@ impl PanelWindow {
         let Some(now) = self.monitor.again(&monitors) else {
             return Ok(Some(format!("monitor {name} is gone")));
         };
-        if !now.same_place(&self.monitor) {
+        if now.rectangle() != self.monitor.rectangle() {
             return Ok(Some(format!("monitor {name} has changed: {now}")));
         }
         if self.settings.exact
