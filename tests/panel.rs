@@ -6,9 +6,7 @@ use holodrive::calibration::zernike;
 use holodrive::encode::{EncodeSettings, Encoding, encode};
 use holodrive::field::{Complex32, Complex64, Field, npy};
 use holodrive::names::Named;
-use holodrive::panel::{
-    Curve, Faults, Frame, Origin, PanelProfile, Response, Setup, Simulation, Wavefront, simulate, wavefront,
-};
+use holodrive::panel::{Curve, Faults, Frame, Origin, PanelProfile, Response, Setup, Simulation, Wavefront, simulate};
 use holodrive::pipeline::{self, Settings};
 use holodrive::points::{Exposure, Multiplexing, PointCloud, PointSource, SubFrames};
 use holodrive::progress::Progress;
@@ -238,12 +236,12 @@ fn two_waves_of_bend_are_found_from_interferograms_and_from_coefficients() {
         let squares: f64 = correction.phase.iter().zip(&error.phase).map(|(a, b)| miss(*a, *b).powi(2)).sum();
         (squares / grid.len() as f64).sqrt()
     };
-    let measured = wavefront::read(&f.join("flat.npy"), None).expect("read");
+    let measured = Wavefront::read(&f.join("flat.npy"), None).expect("read");
     assert_eq!(measured.wavelength, Some(WAVELENGTH));
     println!("interferograms: {:.4} rad RMS = λ/{:.0}", error(&measured), TAU / error(&measured));
     assert!(error(&measured) < TAU / 50.0, "{}", error(&measured));
     // 256 grays a turn: half a step at most.
-    assert!(error(&wavefront::read(&f.join("flat.png"), Some(WAVELENGTH)).expect("read")) < TAU / 256.0);
+    assert!(error(&Wavefront::read(&f.join("flat.png"), Some(WAVELENGTH)).expect("read")) < TAU / 256.0);
 
     // The profile carries its correction, and `encode` applies it once.
     let flat = Field::new(grid, WAVELENGTH, vec![Complex32::new(1.0, 0.0); grid.len()]).expect("field");

@@ -64,7 +64,7 @@ pub fn cards(
 ) -> Result<Vec<Card>> {
     let grid = profile.grid()?;
     if !(distance > 0.0 && distance.is_finite()) {
-        return Err(Error::parameter("distance", format!("{distance} m must be greater than zero")));
+        return Err(Error::out_of_range("distance", format!("{distance} m"), "must be greater than zero"));
     }
     let shown = |phase: Vec<f32>, name: &str| -> Result<Frame> {
         let pattern = Pattern::Phase(PhasePattern::new(grid, wavelength, phase)?);

@@ -221,7 +221,7 @@ pub fn fit_curve(
 fn fit_degree(powers: &[(u16, f64)], levels: usize, order: Order, degree: usize, source: &Path) -> Result<CurveFit> {
     let refuse = |what: String| Err(Error::calibration(source, what));
     if !(1..=9).contains(&degree) {
-        return Err(Error::parameter("degree", format!("{degree} must be 1 … 9")));
+        return Err(Error::out_of_range("degree", degree, "must be 1 … 9"));
     }
     if powers.len() < 4 * (degree + 2) {
         let what = format!("{} powers; a fit of degree {degree} needs {} or more", powers.len(), 4 * (degree + 2));

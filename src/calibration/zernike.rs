@@ -48,7 +48,7 @@ pub fn value(j: usize, radius: f64, angle: f64) -> f64 {
 /// [`Error::Parameter`] for a radius that is not positive, no or too many coefficients, or one that is not finite.
 pub fn wavefront(grid: Grid, wavelength: f64, coefficients: &[f64], radius: f64, name: &str) -> Result<Wavefront> {
     if !(radius > 0.0 && radius.is_finite()) {
-        return Err(Error::parameter("radius", format!("{radius} m must be greater than zero")));
+        return Err(Error::out_of_range("radius", format!("{radius} m"), "must be greater than zero"));
     }
     // Beyond the 20th degree the terms of the radial sum cancel to fewer digits than a phase needs.
     if coefficients.is_empty() || coefficients.len() > 231 || coefficients.iter().any(|c| !c.is_finite()) {

@@ -79,8 +79,8 @@ fn encode_picture(args: &EncodeArgs, setup: &Setup, progress: &Progress, report:
     let own = PlaneEncoding { start, ..given.clone() };
     let planes = read_picture(&rgb, map.as_deref(), &own.depths)?.planes(&setup.grid, args.picture.window)?;
     let kept: Vec<f64> = planes.iter().map(|plane| plane.z).collect();
-    let beside = (settings.correction.as_ref(), settings.illumination);
-    let (mut made, found) = encode_planes(planes, setup.wavelength, &setup.profile, &own, beside, progress)?;
+    let (correction, light) = (settings.correction.as_ref(), settings.illumination);
+    let (mut made, found) = encode_planes(planes, setup.wavelength, &setup.profile, &own, correction, light, progress)?;
     let ends = kept.iter().fold([f64::NEG_INFINITY, f64::INFINITY], |[near, far], &z| [near.max(z), far.min(z)]);
     let source = Some(args.input.display().to_string());
     made.frame.metadata.origin = Origin { source, depth: Some(ends), ..Origin::default() };

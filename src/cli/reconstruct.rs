@@ -8,7 +8,7 @@ use super::report::{Report, seconds};
 use glam::DVec2;
 use holodrive::field::npy;
 use holodrive::panel::simulated::Simulation;
-use holodrive::panel::{Faults, Frame, PanelProfile, wavefront};
+use holodrive::panel::{Faults, Frame, PanelProfile, Wavefront};
 use holodrive::pipeline::{self, Bench};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::{self, ExposureLight, Picture, Reconstruction, Scale, View, ViewSettings, orders};
@@ -39,7 +39,7 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
             report.warn(warnings);
             let typed = &args.simulation;
             let wavefront_error =
-                typed.wavefront_error.as_deref().map(|path| wavefront::read(path, None)).transpose()?;
+                typed.wavefront_error.as_deref().map(|path| Wavefront::read(path, None)).transpose()?;
             let faults = Faults { crosstalk: typed.crosstalk, wavefront_error, ..Faults::default() };
             let simulation = Simulation { subsamples: typed.subpixels, faults, ..Simulation::default() };
             let bench = Bench { simulation, zero_order_stop: typed.zero_order_stop };

@@ -7,7 +7,7 @@ use holodrive::encode::{EncodeOptions, Encoding, Reference};
 use holodrive::hologram::HologramSettings;
 use holodrive::illumination::IlluminationSettings;
 use holodrive::names::Named;
-use holodrive::panel::{Correction, PanelProfile, Setup, Wavefront, wavefront};
+use holodrive::panel::{Correction, PanelProfile, Setup, Wavefront};
 use holodrive::pipeline::{Bench, Settings};
 use holodrive::points::placement::{Phase, SequenceAnchors};
 use holodrive::points::trace::TraceSettings;
@@ -47,7 +47,7 @@ pub(super) fn correction(named: Option<&str>) -> Result<Correction> {
     Ok(match named {
         None => Correction::Profile,
         Some("none") => Correction::None,
-        Some(file) => Correction::Given(wavefront::read(Path::new(file), None)?),
+        Some(file) => Correction::Given(Wavefront::read(Path::new(file), None)?),
     })
 }
 

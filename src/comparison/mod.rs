@@ -208,8 +208,8 @@ fn by_planes(
         _ => effort.start,
     };
     let settings = PlaneEncoding { iterations: effort.iterations, start, ..settings };
-    let beside = (None, Illumination::Normal);
-    Ok(encode_planes(planes, setup.wavelength, &setup.profile, &settings, beside, progress)?.0.frame)
+    let (profile, light) = (&setup.profile, Illumination::Normal);
+    Ok(encode_planes(planes, setup.wavelength, profile, &settings, None, light, progress)?.0.frame)
 }
 
 fn by_field(

@@ -1,33 +1,17 @@
-//! Limiting a field to a window of spatial frequencies.
+//! Windows of spatial frequencies that an encoding's object may take.
 
 use crate::error::{Error, Result};
-use crate::field::{Complex32, Fft2, Field};
+use crate::field::Field;
 use crate::progress::Progress;
 use crate::propagation::Aperture;
+pub use crate::propagation::limit;
 
-/// The field's part within the window, and the share of its energy that lay outside.
-///
-/// The transform is periodic over the grid: what leaves at one border of a sharp window rings in at the other.
-///
-/// # Errors
-/// [`Error::Interrupted`] when asked to stop.
-pub fn limit(field: &Field, aperture: &Aperture, progress: &Progress) -> Result<(Field, f64)> {
-    let grid = field.grid;
-    let mut samples = field.samples.clone();
-    let before = field.energy();
-    let transfer = |kx: usize, column: &mut [Complex32]| {
-        let fx = grid.frequency_x(kx);
-        for (ky, u) in column.iter_mut().enumerate() {
-            if !aperture.passes(fx, grid.frequency_y(ky)) {
-                *u = Complex32::new(0.0, 0.0);
-            }
-        }
-    };
-    Fft2::new(grid.width, grid.height).filter(&mut samples, grid.height, grid.height, transfer, progress);
+/// The part of a field that an encoding takes as its object, the first of its steps, and the share that is dropped.
+pub(super) fn object(field: &Field, aperture: &Aperture, progress: &Progress) -> Result<(Field, f64)> {
+    let limited = limit(field, aperture, progress)?;
+    progress.advance(1);
     progress.check()?;
-    let limited = Field { grid, wavelength: field.wavelength, samples };
-    let dropped = if before > 0.0 { (1.0 - limited.energy() / before).max(0.0) } else { 0.0 };
-    Ok((limited, dropped))
+    Ok(limited)
 }
 
 /// A centred window of `share` (0 … 1) of the grid's limits, with room for the rounding of frequencies on its border.
@@ -39,7 +23,7 @@ pub(super) fn centered(field: &Field, share: [f64; 2]) -> Aperture {
 /// A centred window of shares above 0 and at most 1 of the grid's limits.
 pub(super) fn of_share(field: &Field, share: [f64; 2]) -> Result<Aperture> {
     match share.iter().find(|share| !(**share > 0.0 && **share <= 1.0)) {
-        Some(share) => Err(Error::parameter("band", format!("{share} must be above 0 and at most 1"))),
+        Some(share) => Err(Error::out_of_range("band", share, "must be above 0 and at most 1")),
         None => Ok(centered(field, share)),
     }
 }

@@ -13,7 +13,6 @@ use crate::progress::Progress;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
-use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// Columns of a cell.
@@ -63,9 +62,7 @@ pub(super) fn pattern(field: &Field, settings: &CellHologram, progress: &Progres
     let grid = field.grid;
     let columns = settings.cell.columns();
     let aperture = band::of_share(field, [1.0 / columns as f64, 1.0])?;
-    let (target, dropped) = band::limit(field, &aperture, progress)?;
-    progress.advance(1);
-    progress.check()?;
+    let (target, dropped) = band::object(field, &aperture, progress)?;
     let greatest = amplitude_at(&target, settings.percentile)?;
     if greatest == 0.0 {
         return Err(Error::parameter("percentile", "no light within the cells' band"));
@@ -83,18 +80,11 @@ pub(super) fn pattern(field: &Field, settings: &CellHologram, progress: &Progres
     let transmittance = (0..grid.len()).into_par_iter().map(|i| raw(i).min(1.0)).collect();
     let clipped = (0..grid.len()).into_par_iter().filter(|&i| raw(i) > 1.0 + 1e-6).count() as f64 / grid.len() as f64;
     progress.advance(1);
-    let record = EncodingRecord {
-        method: settings.cell.name().into(),
-        modulation: Modulation::Amplitude,
-        parameters: BTreeMap::from([
-            ("carrier".to_owned(), json!([carrier, 0.0])),
-            ("percentile".to_owned(), json!(settings.percentile)),
-            ("amplitude".to_owned(), json!(greatest)),
-        ]),
-        illumination: Illumination::Plane { frequency: [carrier, 0.0] },
-        aperture: Some(aperture),
-        scale: 1.0 / (columns as f64 * f64::from(range)),
-    };
+    let parameters = json!({ "carrier": [carrier, 0.0], "percentile": settings.percentile, "amplitude": greatest });
+    let scale = 1.0 / (columns as f64 * f64::from(range));
+    let name = settings.cell.name();
+    let mut record = EncodingRecord::new(name, Modulation::Amplitude, parameters, Some(aperture), scale);
+    record.illumination = Illumination::Plane { frequency: [carrier, 0.0] };
     let pattern = Pattern::Fringe(FringePattern::new(grid, field.wavelength, transmittance)?);
     Ok(EncodedPattern { pattern, record, target, clipped, dropped, warnings: band::lost(dropped) })
 }

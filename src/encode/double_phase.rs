@@ -10,11 +10,11 @@
 use super::{EncodedPattern, amplitude_at, band};
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Complex64, Field, Grid};
-use crate::panel::{EncodingRecord, Illumination, Modulation, Pattern, PhasePattern};
+use crate::panel::{EncodingRecord, Modulation, Pattern, PhasePattern};
 use crate::progress::Progress;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use serde_json::json;
 
 /// Which pixels show θ₊.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,9 +60,7 @@ const TRIAL: usize = 512;
 
 pub(super) fn pattern(field: &Field, settings: &DoublePhase, progress: &Progress) -> Result<EncodedPattern> {
     let aperture = band::of_share(field, settings.band)?;
-    let (target, dropped) = band::limit(field, &aperture, progress)?;
-    progress.advance(1);
-    progress.check()?;
+    let (target, dropped) = band::object(field, &aperture, progress)?;
     let percentile = match settings.percentile {
         Some(percentile) => percentile,
         None => best_percentile(&target, settings, progress)?,
@@ -88,20 +86,11 @@ pub(super) fn pattern(field: &Field, settings: &DoublePhase, progress: &Progress
     if !apart {
         warnings.push("the band is wider than half the panel's: conjugate orders overlap the object".into());
     }
-    let parameters = BTreeMap::from([
-        ("interlace".to_owned(), serde_json::json!(settings.interlace)),
-        ("band".to_owned(), serde_json::json!(settings.band)),
-        ("percentile".to_owned(), serde_json::json!(percentile)),
-        ("amplitude".to_owned(), serde_json::json!(greatest)),
-    ]);
-    let record = EncodingRecord {
-        method: "double-phase".into(),
-        modulation: Modulation::Phase,
-        parameters,
-        illumination: Illumination::Normal,
-        aperture: Some(aperture),
-        scale: 1.0 / f64::from(greatest),
-    };
+    let parameters = json!({
+        "interlace": settings.interlace, "band": settings.band, "percentile": percentile, "amplitude": greatest,
+    });
+    let scale = 1.0 / f64::from(greatest);
+    let record = EncodingRecord::new("double-phase", Modulation::Phase, parameters, Some(aperture), scale);
     let pattern = Pattern::Phase(PhasePattern::new(field.grid, field.wavelength, phase)?);
     Ok(EncodedPattern { pattern, record, target, clipped, dropped, warnings })
 }

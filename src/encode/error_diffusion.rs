@@ -7,10 +7,9 @@
 use super::{EncodedPattern, amplitude_at, band};
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Field};
-use crate::panel::{DriveCurve, EncodingRecord, Illumination, Modulation, Pattern, PhasePattern};
+use crate::panel::{DriveCurve, EncodingRecord, Modulation, Pattern, PhasePattern};
 use crate::progress::Progress;
 use serde_json::json;
-use std::collections::BTreeMap;
 
 /// Settings of the error diffusion.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,9 +36,7 @@ pub(super) fn pattern(
     progress: &Progress,
 ) -> Result<EncodedPattern> {
     let aperture = band::of_share(field, settings.band)?;
-    let (target, dropped) = band::limit(field, &aperture, progress)?;
-    progress.advance(1);
-    progress.check()?;
+    let (target, dropped) = band::object(field, &aperture, progress)?;
     let greatest = amplitude_at(&target, settings.percentile)?;
     if greatest == 0.0 {
         return Err(Error::parameter("band", "no light within the encoding's band; widen it"));
@@ -64,20 +61,11 @@ pub(super) fn pattern(
         wish - Complex32::from_polar(1.0, phase[i] + wave.arg())
     });
     progress.advance(1);
-    let parameters = BTreeMap::from([
-        ("serpentine".to_owned(), json!(settings.serpentine)),
-        ("band".to_owned(), json!(settings.band)),
-        ("percentile".to_owned(), json!(settings.percentile)),
-        ("amplitude".to_owned(), json!(greatest)),
-    ]);
-    let record = EncodingRecord {
-        method: "error-diffusion".into(),
-        modulation: Modulation::Phase,
-        parameters,
-        illumination: Illumination::Normal,
-        aperture: Some(aperture),
-        scale: 1.0 / f64::from(greatest),
-    };
+    let parameters = json!({
+        "serpentine": settings.serpentine, "band": settings.band, "percentile": settings.percentile, "amplitude": greatest,
+    });
+    let scale = 1.0 / f64::from(greatest);
+    let record = EncodingRecord::new("error-diffusion", Modulation::Phase, parameters, Some(aperture), scale);
     let clipped = clipped as f64 / phase.len() as f64;
     let pattern = Pattern::Phase(PhasePattern::new(field.grid, field.wavelength, phase)?);
     Ok(EncodedPattern { pattern, record, target, clipped, dropped, warnings: band::lost(dropped) })

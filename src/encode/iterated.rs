@@ -12,7 +12,6 @@ use crate::panel::{EncodingRecord, Illumination, Modulation, PanelProfile, Patte
 use crate::progress::Progress;
 use crate::propagation::{Aperture, propagate};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
 
 /// Settings of the gradient descent on the complex field within a band.
 #[derive(Clone, Debug, PartialEq)]
@@ -135,11 +134,7 @@ pub(super) fn gradient(
         illumination,
     };
     let found = gradient_descent(&target, profile, field.wavelength, &descent, progress)?;
-    let parameters = BTreeMap::from([
-        ("band".to_owned(), json!(settings.band)),
-        ("iterations".to_owned(), json!(settings.iterations)),
-        ("step".to_owned(), json!(settings.step)),
-    ]);
+    let parameters = json!({ "band": settings.band, "iterations": settings.iterations, "step": settings.step });
     let record = record("gradient", &found, Some(aperture), illumination, parameters);
     let (dropped, warnings) = (made.dropped, band::lost(made.dropped));
     let pattern = Pattern::Phase(found.pattern);
@@ -155,7 +150,7 @@ pub(super) fn of_field(
     progress: &Progress,
 ) -> Result<EncodedPattern> {
     if settings.depths.is_empty() {
-        let what = format!("{} needs the depths at which the picture should stand: --depths", settings.method.name());
+        let what = format!("{} needs the depths at which the picture should stand", settings.method.name());
         return Err(Error::parameter("depths", what));
     }
     if settings.depths.len() > 64 {
@@ -266,13 +261,13 @@ fn run(
     gerchberg_saxton(target, profile, wavelength, &projections, progress)
 }
 
-fn parameters(settings: &PlaneEncoding) -> BTreeMap<String, Value> {
-    BTreeMap::from([
-        ("depths".to_owned(), json!(settings.depths)),
-        ("iterations".to_owned(), json!(settings.iterations)),
-        ("efficiency".to_owned(), json!(settings.efficiency)),
-        ("start".to_owned(), json!(format!("{:?}", settings.start))),
-    ])
+fn parameters(settings: &PlaneEncoding) -> Value {
+    json!({
+        "depths": settings.depths,
+        "iterations": settings.iterations,
+        "efficiency": settings.efficiency,
+        "start": format!("{:?}", settings.start),
+    })
 }
 
 fn record(
@@ -280,17 +275,11 @@ fn record(
     found: &Solution,
     aperture: Option<Aperture>,
     illumination: Illumination,
-    mut parameters: BTreeMap<String, Value>,
+    mut parameters: Value,
 ) -> EncodingRecord {
-    let first_and_last = [found.history.first(), found.history.last()];
-    parameters.insert("error".to_owned(), json!(first_and_last));
-    parameters.insert("rejected".to_owned(), json!(found.rejected));
-    EncodingRecord {
-        method: method.into(),
-        modulation: Modulation::Phase,
-        parameters,
-        illumination,
-        aperture,
-        scale: if found.scale > 0.0 { 1.0 / found.scale } else { 1.0 },
-    }
+    parameters["error"] = json!([found.history.first(), found.history.last()]);
+    parameters["rejected"] = json!(found.rejected);
+    let scale = if found.scale > 0.0 { 1.0 / found.scale } else { 1.0 };
+    let record = EncodingRecord::new(method, Modulation::Phase, parameters, aperture, scale);
+    EncodingRecord { illumination, ..record }
 }

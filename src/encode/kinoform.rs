@@ -6,21 +6,14 @@
 use super::EncodedPattern;
 use crate::error::Result;
 use crate::field::Field;
-use crate::panel::{EncodingRecord, Illumination, Modulation, Pattern, PhasePattern};
+use crate::panel::{EncodingRecord, Modulation, Pattern, PhasePattern};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use serde_json::json;
 
 /// arg u at each pixel.
 pub(super) fn pattern(field: &Field) -> Result<EncodedPattern> {
     let phase = field.samples.par_iter().map(|u| u.arg()).collect();
     let pattern = Pattern::Phase(PhasePattern::new(field.grid, field.wavelength, phase)?);
-    let record = EncodingRecord {
-        method: "kinoform".into(),
-        modulation: Modulation::Phase,
-        parameters: BTreeMap::new(),
-        illumination: Illumination::Normal,
-        aperture: None,
-        scale: 1.0,
-    };
+    let record = EncodingRecord::new("kinoform", Modulation::Phase, json!({}), None, 1.0);
     Ok(EncodedPattern { pattern, record, target: field.clone(), clipped: 0.0, dropped: 0.0, warnings: Vec::new() })
 }

@@ -17,10 +17,25 @@
 //! | [`Encoding::Cells`] | amplitude | a third or a quarter along x | 1/12 (Burckhardt), 1/16 (Lee) |
 //! | [`Encoding::Binary`] | amplitude, 1 bit | half the panel's along the carrier | 1/π² by threshold |
 //!
+//! ```
+//! use holodrive::encode::{DoublePhase, EncodeSettings, Encoding, encode};
+//! use holodrive::field::{Complex32, Field};
+//! use holodrive::panel::PanelProfile;
+//! use holodrive::progress::Progress;
+//!
+//! let panel = PanelProfile::phase(64, 48, 8e-6, 8, 532e-9)?;
+//! let mut field = Field::zeros(panel.grid()?, 532e-9);
+//! field.samples.fill(Complex32::new(1.0, 0.0));
+//! let settings = EncodeSettings::new(Encoding::DoublePhase(DoublePhase::default()));
+//! let encoded = encode(&field, &panel, &settings, &Progress::new())?;
+//! assert!(encoded.report.efficiency > 0.99 && encoded.report.field_error < 1e-2);
+//! # Ok::<(), holodrive::Error>(())
+//! ```
+//!
 //! The iterative ones also take pictures at depths for targets: [`pictures`], [`iterative`].
 //!
 //! *Placement.* A phase pattern may be made for light that falls on the panel obliquely or from a point
-//! ([`EncodeSettings::illumination`]): in straight light it then carries a blaze or a lens of its own, and what dead space
+//! ([`EncodeSettings::illumination`]): at normal incidence it then carries a blaze or a lens of its own, and what dead space
 //! and curve errors leave unmodulated goes another way than the object. [`EncodeSettings::stop`] keeps the object's own
 //! light out of a disc about the axis, where a stop for the zero order stands.
 
@@ -28,6 +43,7 @@ pub mod band;
 pub mod binary;
 pub mod cells;
 pub mod double_phase;
+mod encoding;
 pub mod error_diffusion;
 pub mod fringe;
 mod iterated;
@@ -40,6 +56,7 @@ pub mod pictures;
 pub use binary::{Binarisation, BinaryFringe};
 pub use cells::{Cell, CellHologram};
 pub use double_phase::{DoublePhase, Interlace};
+pub use encoding::Encoding;
 pub use error_diffusion::ErrorDiffusion;
 pub use fringe::Quantity;
 pub use iterated::{BandGradient, PlaneEncoding, PlaneMethod, PlaneStart};
@@ -47,111 +64,13 @@ pub use off_axis::{OffAxis, Reference};
 pub use options::EncodeOptions;
 
 use crate::error::{Error, Result};
-use crate::field::{Complex32, Complex64, Field};
-use crate::names::{Name, Named};
+use crate::field::{Complex32, Field};
+use crate::names::Named;
 use crate::panel::simulated::illuminate;
-use crate::panel::{EncodingRecord, Frame, Illumination, Modulation, PanelProfile, Pattern, Wavefront, drive};
+use crate::panel::{EncodingRecord, Frame, Illumination, Modulation, PanelProfile, Pattern, Wavefront, drive_measured};
 use crate::progress::Progress;
 use crate::propagation::Aperture;
 use rayon::prelude::*;
-
-/// The ways from a complex field to what a panel can show.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Encoding {
-    /// Two phases for one complex value, interlaced: Hsueh & Sawchuk 1978.
-    DoublePhase(DoublePhase),
-    /// The field's phase alone, its amplitude dropped: Lesem, Hirsch & Jordan 1969.
-    Kinoform,
-    /// Interference term of object and oblique reference, Re(u·r*), raised to be positive.
-    OffAxisBipolar(OffAxis),
-    /// Interference of object and oblique reference as a plate records it, |u + r|².
-    OffAxisIntensity(OffAxis),
-    /// Real part of the object's upper half of the band, raised to be positive: Bryngdahl & Lohmann 1968.
-    SingleSideBand(OffAxis),
-    /// Phase alone, the error of each pixel handed on to its neighbours: Tsang & Poon 2013.
-    ErrorDiffusion(ErrorDiffusion),
-    /// Phases found by gradient descent, so that the field within a band comes out as a complex field.
-    Gradient(BandGradient),
-    /// Phases found so that the field's amplitudes stand on planes, whatever their phases there.
-    Planes(PlaneEncoding),
-    /// Amplitudes of neighbouring columns whose light has different phases along the carrier.
-    Cells(CellHologram),
-    /// Fringes of two amplitudes.
-    Binary(BinaryFringe),
-}
-
-impl Named for Encoding {
-    const KIND: &'static str = "encoding";
-    const NAMES: &'static [Name<Self>] = &[
-        ("double-phase", || Self::DoublePhase(DoublePhase::default()), "two phases for one complex value, interlaced"),
-        ("kinoform", || Self::Kinoform, "the field's phase alone"),
-        ("off-axis-bipolar", || Self::OffAxisBipolar(OffAxis::default()), "fringes with an oblique reference, raised"),
-        ("off-axis-intensity", || Self::OffAxisIntensity(OffAxis::default()), "interference as a plate records it"),
-        ("single-side-band", || Self::SingleSideBand(OffAxis::default()), "fringes of the upper half of the band"),
-        ("error-diffusion", || Self::ErrorDiffusion(ErrorDiffusion::default()), "phase alone, its error handed on"),
-        ("gradient", || Self::Gradient(BandGradient::default()), "the complex field by gradient descent"),
-        ("plane-gradient", || planes(PlaneMethod::Gradient), "amplitudes at depths by gradient descent"),
-        ("gerchberg-saxton", || planes(PlaneMethod::GerchbergSaxton), "amplitudes at depths by projections"),
-        ("weighted", || planes(PlaneMethod::Weighted), "the same, what is too dark weighted up"),
-        ("double-constraint", || planes(PlaneMethod::DoubleConstraint), "amplitude and phase at depths: no speckle"),
-        ("burckhardt", || cells(Cell::Burckhardt), "three amplitudes for one complex value"),
-        ("lee", || cells(Cell::Lee), "four amplitudes for one complex value"),
-        ("binary-threshold", || binary(Binarisation::Threshold), "fringes of two amplitudes by threshold"),
-        ("binary-diffusion", || binary(Binarisation::ErrorDiffusion), "the same by error diffusion"),
-        ("binary-search", || binary(Binarisation::DirectSearch { sweeps: 5 }), "the same by direct search"),
-    ];
-
-    fn name(&self) -> &'static str {
-        match self {
-            Self::DoublePhase(_) => "double-phase",
-            Self::Kinoform => "kinoform",
-            Self::OffAxisBipolar(_) => "off-axis-bipolar",
-            Self::OffAxisIntensity(_) => "off-axis-intensity",
-            Self::SingleSideBand(_) => "single-side-band",
-            Self::ErrorDiffusion(_) => "error-diffusion",
-            Self::Gradient(_) => "gradient",
-            Self::Planes(settings) => settings.method.name(),
-            Self::Cells(settings) => settings.cell.name(),
-            Self::Binary(settings) => settings.method.name(),
-        }
-    }
-}
-
-fn planes(method: PlaneMethod) -> Encoding {
-    Encoding::Planes(PlaneEncoding::new(method))
-}
-
-fn cells(cell: Cell) -> Encoding {
-    Encoding::Cells(CellHologram { cell, percentile: 0.999 })
-}
-
-fn binary(method: Binarisation) -> Encoding {
-    Encoding::Binary(BinaryFringe::new(method))
-}
-
-impl Encoding {
-    /// The usual encoding for what a panel modulates.
-    pub fn usual(modulation: Modulation) -> Self {
-        match modulation {
-            Modulation::Amplitude => Self::OffAxisBipolar(OffAxis::default()),
-            Modulation::Phase => Self::DoublePhase(DoublePhase::default()),
-        }
-    }
-
-    /// What its pattern modulates.
-    pub fn modulation(&self) -> Modulation {
-        match self {
-            Self::DoublePhase(_) | Self::Kinoform | Self::ErrorDiffusion(_) | Self::Gradient(_) | Self::Planes(_) => {
-                Modulation::Phase
-            }
-            Self::OffAxisBipolar(_)
-            | Self::OffAxisIntensity(_)
-            | Self::SingleSideBand(_)
-            | Self::Cells(_)
-            | Self::Binary(_) => Modulation::Amplitude,
-        }
-    }
-}
 
 /// What [`encode`] does beside the encoding.
 #[derive(Clone, Debug)]
@@ -173,7 +92,7 @@ impl EncodeSettings {
     }
 }
 
-/// The wave for which a pattern must be made, so that in straight light it sends its object aside by the angles θ_x and θ_y
+/// The wave for which a pattern must be made, so that at normal incidence it sends its object aside by the angles θ_x and θ_y
 /// [rad] (a blaze) and focuses it by a lens of that focal length [m] (negative: spreads it).
 ///
 /// # Errors
@@ -213,7 +132,7 @@ pub struct EncodedPattern {
     pub warnings: Vec<String>,
 }
 
-/// What came of an encoding, measured on the panel's own levels (ideal otherwise: full fill factor, no bend).
+/// What came of an encoding, measured on the panel's own levels (ideal otherwise: full fill factor, no wavefront error).
 #[derive(Clone, Debug, PartialEq)]
 pub struct EncodeReport {
     /// The encoding's name.
@@ -283,32 +202,26 @@ pub fn encode(
     let profile = amplitude.as_ref().unwrap_or(profile);
     let grid = profile.grid()?;
     crate::panel::drive::fit(field.grid, profile)?;
-    let made = lit_pattern(field, settings, profile, progress)?;
+    let made = pattern_for(field, settings, profile, progress)?;
     progress.start("drive levels", grid.height as u64);
-    let mut driven = drive(&made.pattern, settings.correction.as_ref(), profile)?;
+    let (driven, fidelity) =
+        drive_measured(&made.pattern, made.record, &made.target, settings.correction.as_ref(), profile, progress)?;
     warnings.extend(made.warnings);
-    warnings.append(&mut driven.warnings);
-    progress.check()?;
-    let mut frame = driven.frame;
-    let mut record = made.record;
-    let seen = shown(&frame, settings.correction.as_ref(), &record)?;
-    let (efficiency, field_error, scale) = compare(&made.target, seen, &record, progress)?;
-    record.scale = scale;
-    frame.metadata.encoding = Some(record);
+    warnings.extend(driven.warnings);
     let report = EncodeReport {
         method: encoding.name(),
-        efficiency,
-        field_error,
+        efficiency: fidelity.efficiency,
+        field_error: fidelity.field_error,
         clipped: made.clipped,
         dropped: made.dropped,
         quantisation_error: driven.rms_error,
         unreachable: driven.unreachable,
         warnings,
     };
-    Ok(Encoded { frame, report })
+    Ok(Encoded { frame: driven.frame, report })
 }
 
-/// The pattern of an encoding before it meets the panel's levels, in straight light, with the field that it stands for.
+/// The pattern of an encoding before it meets the panel's levels, at normal incidence, with the field that it stands for.
 ///
 /// # Errors
 /// As [`encode`].
@@ -318,14 +231,14 @@ pub fn pattern(
     profile: &PanelProfile,
     progress: &Progress,
 ) -> Result<EncodedPattern> {
-    lit_pattern(field, &EncodeSettings::new(encoding.clone()), profile, progress)
+    pattern_for(field, &EncodeSettings::new(encoding.clone()), profile, progress)
 }
 
 /// The same for the light and the stop of the settings.
 ///
 /// Only error diffusion and the iterations look at the profile's levels here, because their later pixels or steps make
 /// up for what the earlier could not show.
-fn lit_pattern(
+fn pattern_for(
     field: &Field,
     settings: &EncodeSettings,
     profile: &PanelProfile,
@@ -333,11 +246,9 @@ fn lit_pattern(
 ) -> Result<EncodedPattern> {
     let illumination = settings.illumination;
     if illumination != Illumination::Normal && settings.encoding.modulation() == Modulation::Amplitude {
-        let what = format!("{} has a reference wave instead: --reference-angle", settings.encoding.name());
+        let what = format!("{} has a reference wave instead; set its angle", settings.encoding.name());
         return Err(Error::parameter("blaze, lens", what));
     }
-    let mut incident = vec![Complex32::new(1.0, 0.0); field.samples.len()];
-    illuminate(&mut incident, field.grid, field.wavelength, illumination)?;
     let stopped = match settings.stop {
         stop if stop > 0.0 => {
             let all = Aperture::centered(f64::INFINITY, f64::INFINITY);
@@ -346,7 +257,7 @@ fn lit_pattern(
         _ => None,
     };
     let (kept, lost) = stopped.as_ref().map_or((field, 0.0), |(field, lost)| (field, *lost));
-    let mut made = straight_pattern(kept, &settings.encoding, (profile, illumination, &incident), progress)?;
+    let mut made = unstopped_pattern(kept, &settings.encoding, profile, illumination, progress)?;
     if settings.stop > 0.0 {
         let whole = Aperture::centered(field.grid.limit_x() * 1.01, field.grid.limit_y() * 1.01);
         made.record.aperture.get_or_insert(whole).stop = settings.stop;
@@ -374,11 +285,12 @@ fn lit_pattern(
     Ok(made)
 }
 
-/// The pattern for an incident wave: encodings that do not look at levels are made for straight light and turned.
-fn straight_pattern(
+/// The pattern for an incident wave: encodings that do not look at levels are made for normal incidence and turned.
+fn unstopped_pattern(
     field: &Field,
     encoding: &Encoding,
-    (profile, illumination, incident): (&PanelProfile, Illumination, &[Complex32]),
+    profile: &PanelProfile,
+    illumination: Illumination,
     progress: &Progress,
 ) -> Result<EncodedPattern> {
     use off_axis::OffAxisKind;
@@ -389,6 +301,8 @@ fn straight_pattern(
     if field.samples.iter().all(|u| u.norm_sqr() == 0.0) {
         return Err(Error::parameter("field", "it is dark everywhere; there is nothing to encode"));
     }
+    let mut incident = vec![Complex32::new(1.0, 0.0); field.samples.len()];
+    illuminate(&mut incident, field.grid, field.wavelength, illumination)?;
     progress.start(encoding.name(), 2);
     let mut made = match encoding {
         Encoding::DoublePhase(settings) => double_phase::pattern(field, settings, progress),
@@ -398,7 +312,7 @@ fn straight_pattern(
         Encoding::SingleSideBand(settings) => off_axis::pattern(field, settings, OffAxisKind::SingleSideBand, progress),
         Encoding::ErrorDiffusion(settings) => {
             let curve = profile.drive_curve(field.wavelength)?.0;
-            return error_diffusion::pattern(field, settings, &curve, incident, progress);
+            return error_diffusion::pattern(field, settings, &curve, &incident, progress);
         }
         Encoding::Gradient(settings) => {
             return iterated::gradient(field, settings, profile, illumination, progress);
@@ -411,59 +325,18 @@ fn straight_pattern(
     }?;
     if let (Pattern::Phase(pattern), false) = (&mut made.pattern, illumination == Illumination::Normal) {
         let turn = |(phase, wave): (&mut f32, &Complex32)| *phase -= wave.arg();
-        pattern.phase.par_iter_mut().zip(incident).for_each(turn);
+        pattern.phase.par_iter_mut().zip(&incident).for_each(turn);
     }
     Ok(made)
-}
-
-/// The field behind the panel as the record has it lit, the correction taken for the bend that it undoes.
-fn shown(frame: &Frame, correction: Option<&Wavefront>, record: &EncodingRecord) -> Result<Field> {
-    let profile = &frame.metadata.panel;
-    let wavelength = frame.metadata.wavelength;
-    let (curve, _) = profile.pixel_curve(wavelength)?;
-    let modulation = curve.modulation();
-    let mut samples: Vec<_> = curve
-        .values(&frame.levels, frame.width)?
-        .into_par_iter()
-        .enumerate()
-        .map(|(i, value)| match modulation {
-            Modulation::Amplitude => Complex32::new(value, 0.0),
-            Modulation::Phase => {
-                let phase = f64::from(value) - correction.map_or(0.0, |c| f64::from(c.phase[i]));
-                Complex32::new(phase.cos() as f32, phase.sin() as f32)
-            }
-        })
-        .collect();
-    let grid = profile.grid()?;
-    illuminate(&mut samples, grid, wavelength, record.illumination)?;
-    Field::new(grid, wavelength, samples)
-}
-
-/// Efficiency, error within the band, and the modulus of ⟨u, g⟩/⟨u, u⟩ for the wanted u and the field g.
-fn compare(wanted: &Field, seen: Field, record: &EncodingRecord, progress: &Progress) -> Result<(f64, f64, f64)> {
-    let seen = match &record.aperture {
-        Some(aperture) => band::limit(&seen, aperture, progress)?.0,
-        None => seen,
-    };
-    let product: Complex64 = wanted
-        .samples
-        .iter()
-        .zip(&seen.samples)
-        .map(|(u, g)| Complex64::new(u.re.into(), -f64::from(u.im)) * Complex64::new(g.re.into(), g.im.into()))
-        .sum();
-    let (uu, gg, count) = (wanted.energy(), seen.energy(), seen.samples.len() as f64);
-    let efficiency = product.norm_sqr() / (uu * count);
-    let error = (1.0 - product.norm_sqr() / (uu * gg)).max(0.0).sqrt();
-    Ok((efficiency, error, product.norm() / uu))
 }
 
 /// The amplitude below which a share `percentile` of the samples lies (1: the greatest).
 ///
 /// # Errors
-/// [`Error::Parameter`] outside (0, 1].
+/// [`Error::OutOfRange`] outside (0, 1].
 fn amplitude_at(field: &Field, percentile: f64) -> Result<f32> {
     if !(percentile > 0.0 && percentile <= 1.0) {
-        return Err(Error::parameter("percentile", format!("{percentile} must be above 0 and at most 1")));
+        return Err(Error::out_of_range("percentile", percentile, "must be above 0 and at most 1"));
     }
     let mut intensity = field.intensity();
     let rank = ((intensity.len() as f64 * percentile).ceil() as usize).max(1) - 1;

@@ -26,7 +26,6 @@ use crate::progress::Progress;
 use crate::propagation::Aperture;
 use rayon::prelude::*;
 use serde_json::json;
-use std::collections::BTreeMap;
 
 /// Direction of the reference wave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -168,9 +167,7 @@ pub(super) fn pattern(
         return Err(Error::out_of_range("reference_ratio", ratio, "must be greater than zero"));
     }
     let CarrierBand { carrier, band: aperture, mut warnings } = carrier_band(field, settings, kind)?;
-    let (target, dropped) = band::limit(field, &aperture, progress)?;
-    progress.advance(1);
-    progress.check()?;
+    let (target, dropped) = band::object(field, &aperture, progress)?;
     let amplitude = amplitude_at(&target, settings.percentile)?;
     if amplitude == 0.0 {
         let what = "no light within the fringes' band; take another carrier, or move the object nearer to the axis";
@@ -196,22 +193,12 @@ pub(super) fn pattern(
     let outside = samples.filter(|&(&u, &r)| !(-1e-6..=1.0 + 1e-6).contains(&fringe.value(u, r)));
     let clipped = outside.count() as f64 / reference.len() as f64;
     progress.advance(1);
-    let mut parameters = BTreeMap::from([
-        ("carrier".to_owned(), json!(carrier)),
-        ("percentile".to_owned(), json!(settings.percentile)),
-        ("amplitude".to_owned(), json!(amplitude)),
-    ]);
+    let mut parameters = json!({ "carrier": carrier, "percentile": settings.percentile, "amplitude": amplitude });
     if kind == OffAxisKind::Intensity {
-        parameters.insert("reference_ratio".to_owned(), json!(ratio));
+        parameters["reference_ratio"] = json!(ratio);
     }
-    let record = EncodingRecord {
-        method: kind.name().into(),
-        modulation: Modulation::Amplitude,
-        parameters,
-        illumination,
-        aperture: Some(aperture),
-        scale,
-    };
+    let mut record = EncodingRecord::new(kind.name(), Modulation::Amplitude, parameters, Some(aperture), scale);
+    record.illumination = illumination;
     let pattern = Pattern::Fringe(FringePattern::new(field.grid, field.wavelength, transmittance)?);
     Ok(EncodedPattern { pattern, record, target, clipped, dropped, warnings })
 }

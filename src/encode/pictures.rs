@@ -130,7 +130,8 @@ pub fn encode_planes(
     wavelength: f64,
     profile: &PanelProfile,
     settings: &PlaneEncoding,
-    (correction, illumination): (Option<&Wavefront>, Illumination),
+    correction: Option<&Wavefront>,
+    illumination: Illumination,
     progress: &Progress,
 ) -> Result<(Encoded, Solution)> {
     let count = planes.len() as f64;

@@ -1,7 +1,7 @@
 //! Each encoding must give its field back as a complex field; what does not fit is refused with numbers.
 
 use super::*;
-use crate::field::{Complex32, Grid, relative_error};
+use crate::field::{Complex64, Grid, relative_error};
 use crate::panel::{PanelKind, Simulation, simulate};
 use crate::random::Random;
 use std::f64::consts::{PI, TAU};

@@ -132,6 +132,23 @@ pub struct EncodingRecord {
     pub scale: f64,
 }
 
+impl EncodingRecord {
+    /// A record for light at normal incidence; `parameters` is an object.
+    pub(crate) fn new(
+        method: &str,
+        modulation: Modulation,
+        parameters: serde_json::Value,
+        aperture: Option<Aperture>,
+        scale: f64,
+    ) -> Self {
+        let parameters = match parameters {
+            serde_json::Value::Object(settings) => settings.into_iter().collect(),
+            _ => BTreeMap::new(),
+        };
+        Self { method: method.into(), modulation, parameters, illumination: Illumination::Normal, aperture, scale }
+    }
+}
+
 /// The wave that reads a panel, of unit amplitude on it. Light travels towards +z.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -4,8 +4,9 @@
 //! metadata is JSON in an `iTXt` chunk with the keyword `holodrive`.
 
 use super::frame::{Frame, FrameMetadata};
-use super::packing::{Packing, SignalLayout, VideoFrame};
+use super::packing::VideoFrame;
 use super::profile::PanelProfile;
+use super::signal::{Packing, SignalLayout};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::units::show_length;
@@ -25,7 +26,7 @@ impl Frame {
             5..=8 => (png::BitDepth::Eight, self.levels.iter().map(|&l| l as u8).collect()),
             _ => (png::BitDepth::Sixteen, self.levels.iter().flat_map(|l| l.to_be_bytes()).collect()),
         };
-        write_png(path, (self.width, self.height), png::ColorType::Grayscale, depth, &bytes, &self.metadata)
+        write_png(path, self.width, self.height, png::ColorType::Grayscale, depth, &bytes, Some(&self.metadata))
     }
 
     /// Levels of `bits` bits, first pixel in the high bits of a byte, each row beginning a new byte.
@@ -58,7 +59,7 @@ impl Frame {
                 FrameMetadata::new(profile, wavelength.unwrap_or(profile.default_wavelength()))
             }
             (None, None) => {
-                let what = "the picture does not say for which panel it is; name one with --panel";
+                let what = "the picture does not say for which panel it is; name the panel";
                 return Err(Error::input(path, what));
             }
         };
@@ -137,29 +138,43 @@ impl VideoFrame {
 
     /// Writes an RGB PNG of the video signal with the metadata; the file appears whole or not at all.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let size = (self.width, self.height);
-        write_png(path, size, png::ColorType::Rgb, png::BitDepth::Eight, &self.rgb, &self.metadata)
+        write_png(
+            path,
+            self.width,
+            self.height,
+            png::ColorType::Rgb,
+            png::BitDepth::Eight,
+            &self.rgb,
+            Some(&self.metadata),
+        )
     }
 }
 
-fn write_png(
+/// Writes a PNG, with metadata where there are some; the file appears whole or not at all.
+pub(super) fn write_png(
     path: &Path,
-    (width, height): (usize, usize),
+    width: usize,
+    height: usize,
     color: png::ColorType,
     depth: png::BitDepth,
     bytes: &[u8],
-    metadata: &FrameMetadata,
+    metadata: Option<&FrameMetadata>,
 ) -> Result<()> {
     let fail = |e: png::EncodingError| match e {
         png::EncodingError::IoError(source) => Error::Io { path: path.into(), source },
         other => Error::unsupported(format!("{}: {other}", path.display())),
     };
-    let json = serde_json::to_string(metadata).map_err(|e| Error::unsupported(format!("{}: {e}", path.display())))?;
+    let json = metadata
+        .map(|metadata| serde_json::to_string(metadata))
+        .transpose()
+        .map_err(|e| Error::unsupported(format!("{}: {e}", path.display())))?;
     files::write_whole(path, |file| {
         let mut encoder = png::Encoder::new(file, width as u32, height as u32);
         encoder.set_color(color);
         encoder.set_depth(depth);
-        encoder.add_itxt_chunk(KEYWORD.into(), json).map_err(fail)?;
+        if let Some(json) = json {
+            encoder.add_itxt_chunk(KEYWORD.into(), json).map_err(fail)?;
+        }
         let mut writer = encoder.write_header().map_err(fail)?;
         writer.write_image_data(bytes).map_err(fail)?;
         writer.finish().map_err(fail)
@@ -350,7 +365,7 @@ mod tests {
             } else {
                 rgb.save(&path).expect("save")
             }
-            assert!(Frame::read(&path, None, None).expect_err(name).to_string().contains("--panel"));
+            assert!(Frame::read(&path, None, None).expect_err(name).to_string().contains("name the panel"));
             let (frame, warnings) = Frame::read(&path, Some(&eight), Some(600e-9)).expect(name);
             assert!(frame.levels.iter().zip(&levels).all(|(&a, &b)| a == u16::from(b)), "{name}");
             assert!(frame.metadata.applied.curve.is_none() && warnings.len() == 1);

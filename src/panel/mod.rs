@@ -6,34 +6,54 @@
 //! pattern + wavefront correction ─▶ wrap to one turn ─▶ level curve ─▶ Frame ─▶ packing ─▶ VideoFrame
 //! ```
 //!
+//! ```
+//! use holodrive::panel::{PanelProfile, Pattern, PhasePattern, Simulation, drive, simulate};
+//! use holodrive::progress::Progress;
+//! use std::f32::consts::PI;
+//!
+//! let panel = PanelProfile::phase(4, 4, 8e-6, 8, 532e-9)?;
+//! let pattern = PhasePattern::new(panel.grid()?, 532e-9, vec![PI; 16])?;
+//! let frame = drive(&Pattern::Phase(pattern), None, &panel)?.frame;
+//! assert_eq!(frame.levels[0], 128);
+//! let light = simulate(&frame, &Simulation::default(), &Progress::new())?;
+//! assert!((light.samples[0].re + 1.0).abs() < 1e-6);
+//! # Ok::<(), holodrive::Error>(())
+//! ```
+//!
 //! What has been done stands in the frame's metadata ([`frame::Applied`]), so that nothing is done twice.
 
 pub mod drive;
 mod drive_curve;
 mod embedded;
+mod fidelity;
 pub mod frame;
 mod frame_file;
 mod nearest_table;
 pub mod packing;
 pub mod profile;
 mod profile_file;
+mod profile_keys;
 mod profile_text;
 pub mod regional;
 pub mod response;
 mod setup;
+mod signal;
 pub mod simulated;
 pub mod vendor;
-pub mod wavefront;
+mod wavefront;
+mod wavefront_file;
 
 pub use drive::{Driven, Pattern, correct, drive};
 pub use drive_curve::{DriveCurve, Modulation};
+pub use fidelity::{Fidelity, drive_measured};
 pub use frame::{Applied, EncodingRecord, Frame, FrameMetadata, Illumination, Origin};
 pub use nearest_table::NearestTable;
-pub use packing::{Packing, SignalLayout, VideoFrame};
+pub use packing::VideoFrame;
 pub use profile::{CorrectionFile, PanelKind, PanelProfile};
 pub use regional::PixelCurve;
 pub use response::{Curve, PhaseSign, Response};
 pub use setup::{Correction, Setup};
+pub use signal::{Packing, SignalLayout};
 pub use simulated::{Faults, Residue, Simulation, simulate, simulate_sequence};
 pub use wavefront::Wavefront;
 

@@ -1,17 +1,14 @@
 //! What is known of a panel: geometry, levels, response, video signal; and which of it nobody has checked.
 
 use super::drive_curve::{DriveCurve, Modulation};
-use super::embedded::PROFILES;
-use super::packing::SignalLayout;
-use super::profile_file;
 use super::regional::PixelCurve;
 use super::response::{Curve, PhaseSign, Response};
+use super::signal::{Packing, SignalLayout};
 use crate::error::{Error, Result};
 use crate::field::Grid;
-use crate::names;
 use crate::units::show_length;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// How a panel modulates light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,7 +34,7 @@ impl PanelKind {
     }
 }
 
-/// A file with the wavefront correction of a panel ([`super::wavefront::read`]).
+/// A file with the wavefront correction of a panel ([`super::Wavefront::read`]).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CorrectionFile {
     /// The file.
@@ -48,6 +45,7 @@ pub struct CorrectionFile {
 
 /// A panel's profile: read from `calib/*.toml` or from the user's file, all lengths in metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct PanelProfile {
     /// Where it was read: a file, or the name of an embedded profile. Errors about the profile name it.
     pub source: PathBuf,
@@ -96,45 +94,72 @@ pub struct PanelProfile {
 }
 
 impl PanelProfile {
-    /// The embedded default.
-    pub fn generic() -> Result<Self> {
-        Self::find("generic")
-    }
-
-    /// An embedded profile by name, or else the TOML file at that path.
+    /// A phase panel without dead space whose levels span one turn at any wavelength, 1 to 8 bits in a gray signal.
+    /// `pitch` and `wavelength` (the default one) in metres; the fields say what else may be set.
     ///
     /// # Errors
-    /// [`Error::Calibration`] when there is neither, or when the file is not a right profile.
-    pub fn find(name: &str) -> Result<Self> {
-        if let Some((_, text)) = PROFILES.iter().find(|(known, _)| *known == name) {
-            return Self::parse(text, Path::new(name));
+    /// [`Error::OutOfRange`] for a size, pitch, number of bits or wavelength outside its domain.
+    pub fn phase(width: usize, height: usize, pitch: f64, bits: u8, wavelength: f64) -> Result<Self> {
+        let levels_for_2pi = f64::from(1u32 << bits.min(16));
+        Self::ideal(PanelKind::PhaseLcos, Curve::Linear { levels_for_2pi }, width, height, pitch, bits, wavelength)
+    }
+
+    /// An amplitude panel without dead space whose transmittance rises in proportion to the level; otherwise as
+    /// [`PanelProfile::phase`]. One bit is a mirror panel.
+    ///
+    /// # Errors
+    /// As [`PanelProfile::phase`].
+    pub fn amplitude(width: usize, height: usize, pitch: f64, bits: u8, wavelength: f64) -> Result<Self> {
+        let kind = if bits == 1 { PanelKind::BinaryDmd } else { PanelKind::Amplitude };
+        Self::ideal(kind, Curve::LinearAmplitude, width, height, pitch, bits, wavelength)
+    }
+
+    fn ideal(
+        kind: PanelKind,
+        curve: Curve,
+        width: usize,
+        height: usize,
+        pitch: f64,
+        bits: u8,
+        wavelength: f64,
+    ) -> Result<Self> {
+        for (name, size) in [("panel width", width), ("panel height", height)] {
+            if !(1..=1 << 16).contains(&size) {
+                return Err(Error::out_of_range(name, size, "must be 1 … 65536 pixels"));
+            }
         }
-        let path = Path::new(name);
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) || path.exists() {
-            return Self::read(path);
+        for (name, length) in [("panel pitch", pitch), ("panel wavelength", wavelength)] {
+            if !(length > 0.0 && length.is_finite()) {
+                return Err(Error::out_of_range(name, length, "m must be greater than zero"));
+            }
         }
-        let names: Vec<_> = Self::embedded_names().collect();
-        let meant = names::meant(name, &names);
-        Err(Error::calibration(
+        if !(1..=8).contains(&bits) {
+            return Err(Error::out_of_range("panel bits", bits, "must be 1 … 8"));
+        }
+        let name = format!("{kind:?} {width}×{height}");
+        Ok(Self {
+            source: PathBuf::from(&name),
             name,
-            format!("no such panel; {meant}give a .toml file or one of: {}", names.join(", ")),
-        ))
-    }
-
-    /// Names of the embedded profiles.
-    pub fn embedded_names() -> impl Iterator<Item = &'static str> {
-        PROFILES.iter().map(|(name, _)| *name)
-    }
-
-    /// Reads a profile from a TOML file.
-    pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
-        Self::parse(&text, path)
-    }
-
-    /// Reads a profile from TOML text; `source` stands in errors.
-    pub fn parse(text: &str, source: &Path) -> Result<Self> {
-        profile_file::parse(text, source)
+            maker: "ideal".into(),
+            kind,
+            width,
+            height,
+            pitch_x: pitch,
+            pitch_y: pitch,
+            bits,
+            fill_factor: 1.0,
+            dead_space: 1.0,
+            wavelengths: vec![wavelength],
+            responses: vec![Response { wavelength: None, curve }],
+            phase_sign: PhaseSign::Increasing,
+            signal: SignalLayout::plain(width, height, if bits == 1 { Packing::Gray1 } else { Packing::Gray }),
+            settle_time: None,
+            refresh: None,
+            edid: None,
+            crosstalk: 0.0,
+            corrections: Vec::new(),
+            unverified: Vec::new(),
+        })
     }
 
     /// What a user should know before trusting the profile: one line a fact that nobody has checked.
@@ -226,5 +251,35 @@ impl PanelProfile {
         let responses = vec![Response { wavelength: None, curve: Curve::LinearAmplitude }];
         let name = format!("{} as amplitude modulator", self.name);
         Some(Self { name, kind: PanelKind::Amplitude, responses, ..self.clone() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn panels_are_made_without_a_file_and_bad_numbers_are_refused() {
+        for profile in [PanelProfile::phase(64, 48, 8e-6, 8, 532e-9), PanelProfile::amplitude(64, 48, 8e-6, 1, 532e-9)]
+        {
+            let profile = profile.expect("profile");
+            // What a file may say: it is written and read back the same.
+            let text = profile.to_toml(&[]).expect("toml");
+            assert_eq!(PanelProfile::parse(&text, &profile.source).expect("read"), profile);
+        }
+        let (curve, _) =
+            PanelProfile::phase(4, 4, 8e-6, 8, 532e-9).expect("profile").drive_curve(600e-9).expect("curve");
+        assert_eq!(curve.nearest(std::f64::consts::PI).0, 128);
+        for (width, pitch, bits, wavelength, word) in [
+            (0, 8e-6, 8, 532e-9, "width"),
+            (4, 0.0, 8, 532e-9, "pitch"),
+            (4, f64::NAN, 8, 532e-9, "pitch"),
+            (4, 8e-6, 0, 532e-9, "bits"),
+            (4, 8e-6, 200, 532e-9, "bits"),
+            (4, 8e-6, 8, -1.0, "wavelength"),
+        ] {
+            let error = PanelProfile::phase(width, 4, pitch, bits, wavelength).expect_err(word);
+            assert!(matches!(error, Error::OutOfRange { .. }) && error.to_string().contains(word), "{error}");
+        }
     }
 }

@@ -1,119 +1,63 @@
-//! Panel profiles as TOML: the file's keys, their units and their domains.
+//! Panel profiles read from TOML: units and domains of the file's keys.
 
 use super::drive_curve::Modulation;
-use super::packing::{Packing, SignalLayout};
+use super::embedded::PROFILES;
 use super::profile::{CorrectionFile, PanelKind, PanelProfile};
-use super::response::{Curve, PhaseSign, Response};
+use super::profile_keys::{CorrectionEntry, CurveKind, ProfileFile, ResponseFile, SignalFile};
+use super::response::{Curve, Response};
+use super::signal::{Packing, SignalLayout};
 use super::vendor;
-use crate::config::{ConfigFile, Quantity};
+use crate::config::ConfigFile;
 use crate::error::{Error, Result};
+use crate::names;
 use crate::units;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ProfileFile {
-    pub(super) name: String,
-    pub(super) maker: String,
-    pub(super) kind: PanelKind,
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) pitch: Option<Quantity>,
-    pub(super) pitch_x: Option<Quantity>,
-    pub(super) pitch_y: Option<Quantity>,
-    pub(super) bits: u8,
-    pub(super) fill_factor: f64,
-    #[serde(default = "one")]
-    pub(super) dead_space: f64,
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub(super) crosstalk: f64,
-    pub(super) wavelengths: Vec<Quantity>,
-    #[serde(default, skip_serializing_if = "is_increasing")]
-    pub(super) phase_sign: PhaseSign,
-    pub(super) settle_time: Option<Quantity>,
-    pub(super) refresh: Option<Quantity>,
-    pub(super) edid: Option<String>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(super) unverified: Vec<String>,
-    pub(super) signal: Option<SignalFile>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(super) correction: Vec<CorrectionEntry>,
-    pub(super) response: Vec<ResponseFile>,
+impl PanelProfile {
+    /// The embedded default.
+    pub fn generic() -> Result<Self> {
+        Self::find("generic")
+    }
+
+    /// An embedded profile by name, or else the TOML file at that path.
+    ///
+    /// # Errors
+    /// [`Error::Calibration`] when there is neither, or when the file is not a right profile.
+    pub fn find(name: &str) -> Result<Self> {
+        if let Some((_, text)) = PROFILES.iter().find(|(known, _)| *known == name) {
+            return Self::parse(text, Path::new(name));
+        }
+        let path = Path::new(name);
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) || path.exists() {
+            return Self::read(path);
+        }
+        let names: Vec<_> = Self::embedded_names().collect();
+        let meant = names::meant(name, &names);
+        Err(Error::calibration(
+            name,
+            format!("no such panel; {meant}give a .toml file or one of: {}", names.join(", ")),
+        ))
+    }
+
+    /// Names of the embedded profiles.
+    pub fn embedded_names() -> impl Iterator<Item = &'static str> {
+        PROFILES.iter().map(|(name, _)| *name)
+    }
+
+    /// Reads a profile from a TOML file.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
+        Self::parse(&text, path)
+    }
+
+    /// Reads a profile from TOML text; `source` stands in errors.
+    pub fn parse(text: &str, source: &Path) -> Result<Self> {
+        parse(text, source)
+    }
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct CorrectionEntry {
-    pub(super) file: PathBuf,
-    pub(super) wavelength: Option<Quantity>,
-}
-
-/// Dead space is taken to reflect as well as the active area, the worst case, where a profile does not say.
-fn one() -> f64 {
-    1.0
-}
-
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
-}
-
-fn is_increasing(sign: &PhaseSign) -> bool {
-    *sign == PhaseSign::Increasing
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SignalFile {
-    pub(super) packing: Packing,
-    pub(super) width: Option<usize>,
-    pub(super) height: Option<usize>,
-    #[serde(default)]
-    pub(super) column_offset: usize,
-    #[serde(default)]
-    pub(super) row_offset: usize,
-    #[serde(default)]
-    pub(super) flip_x: bool,
-    #[serde(default)]
-    pub(super) flip_y: bool,
-}
-
-#[derive(Clone, Copy, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum CurveKind {
-    #[default]
-    Linear,
-    Table,
-    Polynomial,
-    Piston,
-    Amplitude,
-    LevelTable,
-    Regional,
-    /// A vendor's file of phases and levels.
-    HamamatsuLut,
-    /// A vendor's controller table, loaded here instead of there.
-    MeadowlarkLut,
-}
-
-#[derive(Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ResponseFile {
-    pub(super) kind: CurveKind,
-    pub(super) wavelength: Option<Quantity>,
-    pub(super) levels_for_2pi: Option<f64>,
-    pub(super) unit: Option<String>,
-    pub(super) values: Option<Vec<f64>>,
-    pub(super) coefficients: Option<Vec<f64>>,
-    pub(super) heights: Option<Vec<Quantity>>,
-    pub(super) levels: Option<Vec<u16>>,
-    pub(super) regions: Option<[usize; 2]>,
-    pub(super) polynomials: Option<Vec<Vec<f64>>>,
-    pub(super) tables: Option<Vec<Vec<f64>>>,
-    pub(super) file: Option<PathBuf>,
-}
-
-pub(super) fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
+fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
     let at = ConfigFile { source };
     let file: ProfileFile = at.parse(text)?;
     if file.width == 0 || file.height == 0 || file.width > 1 << 16 || file.height > 1 << 16 {
@@ -322,8 +266,8 @@ fn response(at: &ConfigFile<'_>, file: &ResponseFile, modulation: Modulation, le
 
 #[cfg(test)]
 mod tests {
-    use super::super::embedded::PROFILES;
     use super::*;
+    use crate::panel::PhaseSign;
 
     #[test]
     fn every_embedded_profile_is_right_and_named_as_its_file() {

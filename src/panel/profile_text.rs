@@ -1,7 +1,7 @@
 //! Panel profiles written as TOML: what [`super::profile_file`] reads back as the same profile.
 
 use super::profile::PanelProfile;
-use super::profile_file::{CorrectionEntry, CurveKind, ProfileFile, ResponseFile, SignalFile};
+use super::profile_keys::{CorrectionEntry, CurveKind, ProfileFile, ResponseFile, SignalFile};
 use super::response::{Curve, Response};
 use crate::config::Quantity;
 use crate::error::{Error, Result};

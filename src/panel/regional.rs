@@ -88,9 +88,11 @@ impl PixelCurve {
     /// A curve for each of `columns × rows` regions of a panel of `width × height` pixels.
     pub(super) fn regional(
         mean: DriveCurve,
-        (columns, rows): (usize, usize),
+        columns: usize,
+        rows: usize,
         phases: Vec<Vec<f64>>,
-        (width, height): (usize, usize),
+        width: usize,
+        height: usize,
     ) -> Self {
         Self { mean, regions: Some(Regions { columns, rows, phases, width, height }) }
     }

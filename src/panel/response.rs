@@ -173,7 +173,7 @@ impl Curve {
         };
         let factor = phase_factor(wavelength, measured_at, sign);
         let phases = |curve: &Self| curve.phases(levels, wavelength).into_iter().map(|p| p * factor).collect();
-        PixelCurve::regional(mean, (*columns, *rows), curves.iter().map(phases).collect(), size)
+        PixelCurve::regional(mean, *columns, *rows, curves.iter().map(phases).collect(), size.0, size.1)
     }
 
     /// The curve worked out level by level at a wavelength [m]; `measured_at` is where a phase curve was measured.

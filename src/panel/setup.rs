@@ -1,7 +1,7 @@
 //! A panel in the light that it is used in: resolved once from what was asked, and handed round as one thing.
 
 use super::profile::PanelProfile;
-use super::wavefront::{self, Wavefront};
+use super::wavefront::Wavefront;
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::points::colour::Lasers;
@@ -81,7 +81,7 @@ impl Setup {
     /// this laser.
     ///
     /// # Errors
-    /// As [`wavefront::read`] and [`Wavefront::check`].
+    /// As [`Wavefront::read`] and [`Wavefront::check`].
     pub fn correction(&self, wavelength: f64) -> Result<(Option<Wavefront>, Vec<String>)> {
         let profile = &self.profile;
         let distance = |own: Option<f64>| own.map_or(f64::INFINITY, |own| (own - wavelength).abs());
@@ -93,7 +93,7 @@ impl Setup {
                 .iter()
                 .min_by(|a, b| distance(a.wavelength).total_cmp(&distance(b.wavelength)))
                 .filter(|c| c.wavelength.is_none_or(|own| (own - wavelength).abs() <= 0.1 * own))
-                .map(|c| wavefront::read(&c.file, c.wavelength))
+                .map(|c| Wavefront::read(&c.file, c.wavelength))
                 .transpose()?,
         };
         let warnings = match &found {

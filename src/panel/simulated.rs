@@ -114,7 +114,8 @@ pub fn simulate(frame: &Frame, settings: &Simulation, progress: &Progress) -> Re
         let fill = profile.fill_factor as f32;
         values.par_iter().map(|&v| modulate(v) * fill + dead * (1.0 - fill)).collect()
     } else {
-        band_limited(&values, grid, cells, n, profile.fill_factor.sqrt(), dead, modulate, progress)?
+        let pixel = PixelGeometry { cells, subsamples: n, side: profile.fill_factor.sqrt(), dead };
+        band_limited(&values, grid, &pixel, modulate, progress)?
     };
     progress.check()?;
     let (pitch_x, pitch_y) = (grid.pitch_x / n as f64, grid.pitch_y / n as f64);
@@ -157,11 +158,11 @@ fn check(frame: &Frame, grid: Grid, settings: &Simulation) -> Result<()> {
         return Err(Error::parameter("frame", what));
     }
     if !(1..=16).contains(&settings.subsamples) {
-        return Err(Error::parameter("subsamples", format!("{} must be 1 … 16", settings.subsamples)));
+        return Err(Error::out_of_range("subsamples", settings.subsamples, "must be 1 … 16"));
     }
     // Beyond a few pixels nothing of a pattern is left, and the kernel would outgrow the panel.
     if !(0.0..=8.0).contains(&faults.crosstalk) {
-        return Err(Error::parameter("crosstalk", format!("{} must be 0 … 8 pixels", faults.crosstalk)));
+        return Err(Error::out_of_range("crosstalk", faults.crosstalk, "must be 0 … 8 pixels"));
     }
     if !(0.0..=1.0).contains(&faults.amplitude_coupling) || !(0.0..=1.0).contains(&faults.dead_space.unwrap_or(0.0)) {
         return Err(Error::parameter("amplitude_coupling, dead_space", "must be 0 … 1"));
@@ -259,18 +260,27 @@ fn modulated(value: f32, modulation: Modulation, faults: &Faults) -> Complex32 {
     }
 }
 
-/// Rectangles of `cells × cells` values a pixel over the active area, sampled band-limited at `n × n` a pixel.
-#[allow(clippy::too_many_arguments)] // one step of `simulate`, cut out for length
+/// How a pixel is cut up.
+struct PixelGeometry {
+    /// Values along each side of the active area.
+    cells: usize,
+    /// Samples along each side of the pixel.
+    subsamples: usize,
+    /// Side of the active area [pitches].
+    side: f64,
+    /// Modulation of the dead space.
+    dead: Complex32,
+}
+
+/// Rectangles of `cells × cells` values a pixel over the active area, sampled band-limited.
 fn band_limited(
     values: &[f32],
     grid: Grid,
-    cells: usize,
-    n: usize,
-    side: f64,
-    dead: Complex32,
+    pixel: &PixelGeometry,
     modulate: impl Fn(f32) -> Complex32 + Sync,
     progress: &Progress,
 ) -> Result<Vec<Complex32>> {
+    let PixelGeometry { cells, subsamples: n, side, dead } = *pixel;
     let (width, height) = (grid.width, grid.height);
     let plan = Fft2::<f32>::new(width, height);
     let fine = Fft2::<f32>::new(width * n, height * n);

@@ -27,9 +27,11 @@
 //! # Ok::<(), holodrive::Error>(())
 //! ```
 
+mod band;
 pub mod oracle;
 mod scaled;
 
+pub use band::limit;
 pub use scaled::{ScaledPropagator, propagate_scaled};
 
 use crate::error::{Error, Result};

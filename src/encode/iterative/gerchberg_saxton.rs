@@ -80,7 +80,7 @@ pub fn gerchberg_saxton(
         return Err(Error::parameter("target", "projections need amplitudes on planes, not a complex field"));
     };
     if !(settings.efficiency > 0.0 && settings.efficiency <= 1.0) {
-        return Err(Error::parameter("efficiency", format!("{} must be above 0 and at most 1", settings.efficiency)));
+        return Err(Error::out_of_range("efficiency", settings.efficiency, "must be above 0 and at most 1"));
     }
     if settings.iterations == 0 || !(0.0..=1.0).contains(&settings.weighting) {
         let what =

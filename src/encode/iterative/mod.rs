@@ -122,7 +122,7 @@ impl Start {
             }
             Self::Smooth { seed, length } => {
                 if !(*length >= 2.0 && length.is_finite()) {
-                    return Err(Error::parameter("length", format!("{length} pixels must be 2 or more")));
+                    return Err(Error::out_of_range("length", length, "must be 2 pixels or more"));
                 }
                 // A lattice of random phases over three turns, joined by smooth steps.
                 let lattice = |x: usize, y: usize| 3.0 * TAU * Random::new(*seed, (y << 32 | x) as u64).uniform_f32();
