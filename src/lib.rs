@@ -78,6 +78,7 @@ pub mod names;
 pub mod panel;
 pub mod pipeline;
 pub mod points;
+#[cfg(feature = "print")]
 pub mod print;
 pub mod progress;
 pub mod propagation;
