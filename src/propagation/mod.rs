@@ -28,7 +28,6 @@
 //! ```
 
 mod band;
-pub mod oracle;
 mod scaled;
 
 pub use band::limit;

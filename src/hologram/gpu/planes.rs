@@ -18,9 +18,7 @@ use crate::error::{Error, Result};
 use crate::field::{Field, Grid};
 use crate::hologram::definition::Optics;
 use crate::hologram::dispersion::{Dispersion, reduced};
-use crate::hologram::planes::{
-    Cloud, Parameters, PlaneGrid, Slabs, Splat, Table, carrier, layout_of, mean_square, splat,
-};
+use crate::hologram::planes::{Cloud, Parameters, PlaneGrid, Slabs, Splat, Table, carrier, layout, mean_square, splat};
 use crate::hologram::sources::PointWave;
 use crate::progress::Progress;
 use pixels::wgpu;
@@ -49,7 +47,7 @@ pub(crate) struct Cost {
 /// The planes, and the grid of transforms whose lengths have the factors 2, 3 and 5 only.
 fn arrangement(cloud: &Cloud, parameters: &Parameters) -> (Slabs, PlaneGrid) {
     let slabs = parameters.slabs(cloud);
-    let layout = layout_of(cloud, parameters, &slabs, &[1]);
+    let layout = layout(cloud, parameters, &slabs, &[1]);
     (slabs, layout)
 }
 

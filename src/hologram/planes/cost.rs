@@ -3,11 +3,10 @@
 //! Each step of the engine has its own terms, fitted to its own times: 110 runs of 300 to 1e6 points on 0.5 to 33 Mpx on a
 //! 3.7 GHz Zen 4, medians of three.
 
-use super::layout;
 use super::paint::{self, GROUP};
 use super::spectrum::Spectrum;
 use super::table::Table;
-use super::{Cloud, Parameters, Slabs, Splat};
+use super::{Cloud, LENGTH_FACTORS, Parameters, Slabs, Splat, layout};
 use crate::hologram::sources::PointWave;
 
 /// A pixel's part in a column: its factors once a plane, its transform and the sum once a moment [core-seconds].
@@ -45,7 +44,7 @@ impl Parameters {
         if cloud.sources.is_empty() {
             return 0.0;
         }
-        let (layout, grid) = (layout(cloud, self, slabs), cloud.grid);
+        let (layout, grid) = (layout(cloud, self, slabs, &LENGTH_FACTORS), cloud.grid);
         let (planes, rank) = (slabs.depths.len() as f64, self.rank as f64);
         let [width, height] = layout.size.map(|size| size as f64);
         let painted = width * layout.painted as f64;
@@ -104,7 +103,7 @@ impl Parameters {
         if cloud.sources.is_empty() {
             return 0;
         }
-        let layout = layout(cloud, self, slabs);
+        let layout = layout(cloud, self, slabs, &LENGTH_FACTORS);
         let plane = (self.rank * layout.size[0] * layout.painted * 8) as u64;
         let half = [0, 1].map(|axis| Table::half_width(cloud.optics, axis, slabs.half, self.tail));
         let tables: u64 = self.table_bytes(cloud.optics, slabs.half).iter().sum();

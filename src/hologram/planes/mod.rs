@@ -216,17 +216,16 @@ fn reach(optics: &Optics, axis: usize, distance: f64) -> f64 {
     distance * sine / (1.0 - sine * sine).sqrt()
 }
 
-/// The periodic grid: large enough that no point's light comes round onto the panel.
-fn layout(cloud: &Cloud, parameters: &Parameters, slabs: &Slabs) -> PlaneGrid {
-    layout_of(cloud, parameters, slabs, &[1, 7, 11])
-}
+/// Factors beside 2, 3 and 5 of lengths that the CPU's transforms are fast at.
+const LENGTH_FACTORS: [usize; 3] = [1, 7, 11];
 
-/// That grid for transforms of 16·2^a·3^b·5^c times one of `others` samples.
-pub(in crate::hologram) fn layout_of(
+/// The periodic grid: large enough that no point's light comes round onto the panel, for transforms of 16·2^a·3^b·5^c
+/// times one of `factors` samples.
+pub(in crate::hologram) fn layout(
     cloud: &Cloud,
     parameters: &Parameters,
     slabs: &Slabs,
-    others: &[usize],
+    factors: &[usize],
 ) -> PlaneGrid {
     let (optics, grid, h) = (cloud.optics, cloud.grid, slabs.half);
     let mut layout = PlaneGrid { size: [0; 2], painted: 0, origin: [0; 2] };
@@ -235,7 +234,7 @@ pub(in crate::hologram) fn layout_of(
         let [low, high] = cloud.places[axis];
         let painted = high - low + 2.0 * halo + 2.0;
         let size = pixels.max(cloud.period[axis] + parameters.tail);
-        layout.size[axis] = fast_length(size.max(painted).ceil() as usize, 16, others);
+        layout.size[axis] = fast_length(size.max(painted).ceil() as usize, 16, factors);
         layout.origin[axis] = (low - halo).floor() as i64;
         if axis == 1 {
             layout.painted = (painted.ceil() as usize).min(layout.size[1]);
@@ -273,7 +272,7 @@ pub(crate) fn field(cloud: &Cloud, parameters: &Parameters, set: InstructionSet,
     }
     let slabs = parameters.slabs(cloud);
     let h = slabs.half;
-    let layout = layout(cloud, parameters, &slabs);
+    let layout = layout(cloud, parameters, &slabs, &LENGTH_FACTORS);
     progress.start("hologram: planes", sources.len() as u64 + (layout.size[0] * slabs.depths.len()) as u64);
     let tables = parameters.tables(optics, h, progress);
     let tables = tables.each_ref().map(|table| &**table);

@@ -30,19 +30,19 @@ const LARGEST: i64 = {
 // |re|, |im| of a batch's sums fit 32 bits; a part's and a sum of parts' fit 16.
 const _: () = assert!(BATCH as i64 * LARGEST * LARGEST < 1 << 31 && 2 * LARGEST < 1 << 15);
 
-/// The factors of one axis, in 32-bit lanes.
-struct Panel {
-    axis: usize,
-    /// What [`UNIT`] stands for.
-    unit: f64,
-    /// Half the tile [px], and its vectors.
-    half: f64,
-    vectors: usize,
-    /// Steps of a pair of points, of a part, of a block of vectors, vectors of a block.
+/// Where factors go, in 32-bit lanes: steps of a pair of points, of a part, of a block of vectors, vectors of a block.
+struct Layout {
     pair: usize,
     part: usize,
     block: usize,
-    in_block: usize,
+    vectors: usize,
+}
+
+/// The factors of one axis of a batch; [`UNIT`] stands for `unit`.
+struct Panel {
+    axis: usize,
+    unit: f64,
+    layout: Layout,
     to: *mut i32,
 }
 
@@ -72,28 +72,10 @@ pub(super) unsafe fn add_batch(tile: &Tile, points: &[Relative], panels: &mut Pa
     let y = panels.y.values_mut();
     assert!(x.len() >= PAIRS * 3 * tile.width && y.len() >= PAIRS * 3 * stride);
     let (x, y) = (x.as_mut_ptr().cast::<i32>(), y.as_mut_ptr().cast::<i32>());
-    let columns = Panel {
-        axis: 0,
-        unit: unit[0],
-        half: half[0],
-        vectors: tile.width / 16,
-        pair: 3 * COLUMNS,
-        part: COLUMNS,
-        block: PAIRS * 3 * COLUMNS,
-        in_block: COLUMNS / 16,
-        to: x,
-    };
-    let rows = Panel {
-        axis: 1,
-        unit: unit[1],
-        half: half[1],
-        vectors: tile.height.div_ceil(16),
-        pair: 3 * stride,
-        part: stride,
-        block: 16,
-        in_block: 1,
-        to: y,
-    };
+    let layout = Layout { pair: 3 * COLUMNS, part: COLUMNS, block: PAIRS * 3 * COLUMNS, vectors: COLUMNS / 16 };
+    let columns = Panel { axis: 0, unit: unit[0], layout, to: x };
+    let layout = Layout { pair: 3 * stride, part: stride, block: 16, vectors: 1 };
+    let rows = Panel { axis: 1, unit: unit[1], layout, to: y };
     // SAFETY: as asserted.
     unsafe {
         fill(tile, points, &batch, &columns);
@@ -108,7 +90,7 @@ pub(super) unsafe fn add_batch(tile: &Tile, points: &[Relative], panels: &mut Pa
             // SAFETY: the block lies inside the tile, every pair's factors were filled above.
             unsafe {
                 let to = Block { re: re.as_mut_ptr().add(at), im: im.as_mut_ptr().add(at), width: tile.width };
-                let (x, y) = (x.add(column * columns.block), y.add(row * ROWS));
+                let (x, y) = (x.add(column * columns.layout.block), y.add(row * ROWS));
                 product(points.len().div_ceil(2), x, y, stride, &to, scale);
             }
         }
@@ -119,7 +101,9 @@ pub(super) unsafe fn add_batch(tile: &Tile, points: &[Relative], panels: &mut Pa
 #[inline]
 #[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl,avx512vnni,avx2,fma")]
 unsafe fn fill(tile: &Tile, points: &[Relative], batch: &Batch, panel: &Panel) {
-    let Panel { axis, half, vectors, to, .. } = *panel;
+    let Panel { axis, ref layout, to, .. } = *panel;
+    let size = [tile.width, tile.height][axis];
+    let (half, vectors) = (0.5 * (size as f64 - 1.0), size.div_ceil(16));
     let inverse = 1.0 / panel.unit;
     let amplitude = |k: usize| inverse * if axis == 0 { batch.amplitude[k] } else { 1.0 };
     let wave = |k: usize| {
@@ -135,8 +119,9 @@ unsafe fn fill(tile: &Tile, points: &[Relative], batch: &Batch, panel: &Panel) {
     let start = Indexes::from(-half as f32);
     for number in 0..points.len().div_ceil(2) {
         let [first, second] = [2 * number, 2 * number + 1];
-        let place =
-            |vector: usize| number * panel.pair + vector / panel.in_block * panel.block + vector % panel.in_block * 16;
+        let place = |vector: usize| {
+            number * layout.pair + vector / layout.vectors * layout.block + vector % layout.vectors * 16
+        };
         let mut at = start;
         if batch.edge[axis][first] > 0.0 || batch.edge[axis][second] > 0.0 {
             let [first, second] = [tapered(first), tapered(second)];
@@ -146,7 +131,7 @@ unsafe fn fill(tile: &Tile, points: &[Relative], batch: &Batch, panel: &Panel) {
                 unsafe {
                     let (a, b) = (rounded(&first, at.u), rounded(&second, at.u));
                     let (re, im) = (pair(a.0, b.0), pair(a.1, b.1));
-                    put([re, im, _mm512_add_epi16(re, im)], to.add(place(vector)), panel.part);
+                    put([re, im, _mm512_add_epi16(re, im)], to.add(place(vector)), layout.part);
                 }
                 at = at.next();
             }
@@ -154,7 +139,7 @@ unsafe fn fill(tile: &Tile, points: &[Relative], batch: &Batch, panel: &Panel) {
             let (waves, strengths) = ([wave(first), wave(second)], [strength(first), strength(second)]);
             for vector in 0..vectors {
                 // SAFETY: as above.
-                unsafe { put(evaluate(waves, strengths, at), to.add(place(vector)), panel.part) };
+                unsafe { put(evaluate(waves, strengths, at), to.add(place(vector)), layout.part) };
                 at = at.next();
             }
         }

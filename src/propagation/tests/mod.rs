@@ -1,5 +1,7 @@
 //! Trust, from the ground up: analytic fields → the term-by-term oracle → the fast path → single precision.
 
+mod oracle;
+
 use super::*;
 use crate::field::{Complex64, relative_error};
 use crate::random::Random;

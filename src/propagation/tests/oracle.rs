@@ -10,7 +10,7 @@ use crate::field::{Complex64, Field, Grid, grid};
 ///
 /// # Errors
 /// [`Error::Parameter`] when the windows are not centred on one axis or the pitches differ.
-pub fn propagate(field: &Field<f64>, distance: f64, output: Grid) -> Result<Field<f64>> {
+pub(super) fn propagate(field: &Field<f64>, distance: f64, output: Grid) -> Result<Field<f64>> {
     let input = field.grid;
     if input.center != output.center || input.pitch_x != output.pitch_x || input.pitch_y != output.pitch_y {
         return Err(Error::parameter("output", "the oracle takes windows of one middle and one pitch"));
@@ -27,7 +27,7 @@ pub fn propagate(field: &Field<f64>, distance: f64, output: Grid) -> Result<Fiel
 
 /// The same onto a window of any pitch and middle, with the given numbers of frequencies, spaced by 1/(number × input
 /// pitch), of which each has a weight along x (axis 0) and y (axis 1).
-pub fn onto(
+pub(super) fn onto(
     field: &Field<f64>,
     distance: f64,
     output: Grid,
