@@ -54,13 +54,14 @@
 //! 15. [`encode`]: field to phase or fringes for a panel's levels and range
 //! 16. [`reconstruction`]: field to pictures, gray or in three lasers' colours, and how good they are
 //! 17. [`calibration`]: what a detector or an eye saw to a panel's curve and wavefront correction
-//! 18. [`pipeline`]: the whole way, on one screen
-//! 19. [`sequence`]: frames in time: prepared pictures, raw video and arrays; an animated scene, frame by frame
-//! 20. [`live`]: a hologram that follows its scene's file and the operator's keys, coarse at once and refined
-//! 21. [`comparison`]: all encodings side by side, with figures
-//! 22. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
-//! 23. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols, a local one for Python; the panel kept for them
-//! 24. [`display`]: monitors and the fullscreen window (feature `display`)
+//! 18. [`segments`]: a hologram plane in segments (hogels) that each see the scene from their own place
+//! 19. [`pipeline`]: the whole way, on one screen
+//! 20. [`sequence`]: frames in time: prepared pictures, raw video and arrays; an animated scene, frame by frame
+//! 21. [`live`]: a hologram that follows its scene's file and the operator's keys, coarse at once and refined
+//! 22. [`comparison`]: all encodings side by side, with figures
+//! 23. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
+//! 24. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols, a local one for Python; the panel kept for them
+//! 25. [`display`]: monitors and the fullscreen window (feature `display`)
 
 pub mod calibration;
 pub mod comparison;
@@ -85,6 +86,7 @@ pub mod propagation;
 pub mod random;
 pub mod reconstruction;
 pub mod scene;
+pub mod segments;
 pub mod sequence;
 pub mod serve;
 pub mod units;

@@ -128,7 +128,7 @@ fn bad_clouds_fields_and_frames_end_in_one_line() {
     refused(f, &["compute", "dark.ply", "--views", "64"], "of a scene");
     let room = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell.gltf");
     refused(f, &["compute", room, "--views", "64"], "--placement model");
-    refused(f, &["compute", room, "--views", "4", "--placement", "model"], "give 16 to");
+    refused(f, &["compute", room, "--views", "4", "--placement", "model"], "must be 16 to");
     write(f, "field.npy", b"\x93NUMPY\x01\x00");
     refused(f, &["encode", "field.npy"], "field.npy");
     refused(f, &["propagate", "field.npy", "--distance", "1m", "-o", "out.npy"], "field.npy");

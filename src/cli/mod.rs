@@ -17,18 +17,17 @@ mod load;
 mod monitors;
 mod pictures;
 mod print;
-mod print_preview;
 mod reconstruct;
 mod refusal;
 mod report;
 mod resolve;
 #[cfg(feature = "display")]
 mod screen;
+mod segment_views;
 mod sequence;
 mod serve;
 mod show;
 mod steps;
-mod true_views;
 mod usage;
 
 use args::{Cli, Command};

@@ -1,177 +1,111 @@
 //! Plates: planned, computed, checked, looked at, exported.
 
-use super::args::{ExportArgs, ExportFormat, FileArgs, PrintArgs, PrintCommand, VerifyArgs, White};
+use super::args::{ExportArgs, FileArgs, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs, White};
 use super::bar::Bar;
 use super::report::{Report, count, seconds};
-use holodrive::files;
-use holodrive::hologram::InstructionSet;
 use holodrive::print::export::{Format, Frames, export};
-use holodrive::print::{Manifest, Plan, Plate, Shard, Source, Task, job, plan, sample};
+use holodrive::print::preview::PreviewSettings;
+use holodrive::print::{Manifest, Plan, Plate, PlateJob, PlateView, PrintSettings, Shard, folder};
+use holodrive::segments::SceneOptions;
 use holodrive::units::show_length;
 use holodrive::{Error, Result};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub(super) fn print(args: &PrintArgs, json: bool) -> Result<Report> {
     match &args.command {
         Some(PrintCommand::Verify(args)) => verify(args),
-        Some(PrintCommand::Preview(args)) => super::print_preview::look(args),
+        Some(PrintCommand::Preview(args)) => preview(args),
         Some(PrintCommand::Export(args)) => write(args),
-        None => compute(args, json),
+        None => compute(resolved(args)?, json),
     }
 }
 
-/// A scene or a cloud, and how it is lit: its flags, bounces and photons.
-pub(super) fn task(
-    input: &Path,
-    (file, bounces, photons): (&FileArgs, u32, u32),
-    white: Option<White>,
-) -> Result<Task> {
-    Ok(Task {
-        camera: file.camera.clone(),
-        animation: file.animation.clone(),
-        time: file.time,
-        viewer_light: file.viewer_light,
-        bounces,
-        photons,
-        white: match white {
-            None | Some(White::Auto) => None,
-            Some(White::None) => Some(f32::MAX),
-            Some(White::At(white)) if white > 0.0 && white.is_finite() => Some(white),
-            Some(White::At(white)) => {
-                return Err(Error::parameter("white", format!("{white} must be greater than zero")));
-            }
-        },
-        ..Task::new(input.to_path_buf())
-    })
+/// How a scene is lit: its flags, bounces and photons.
+pub(super) fn scene_options(file: &FileArgs, bounces: u32, photons: u32, white: Option<White>) -> Result<SceneOptions> {
+    let white = match white {
+        None | Some(White::Auto) => None,
+        Some(White::None) => Some(f32::MAX),
+        Some(White::At(white)) if white > 0.0 && white.is_finite() => Some(white),
+        Some(White::At(white)) => return Err(Error::out_of_range("white", white, "must be greater than zero")),
+    };
+    let FileArgs { camera, animation, time, viewer_light } = file.clone();
+    Ok(SceneOptions { camera, animation, time, viewer_light, bounces, photons, white })
 }
 
-fn compute(args: &PrintArgs, json: bool) -> Result<Report> {
-    let missing = |what| Error::parameter("print", what);
-    let input =
-        args.input.as_ref().ok_or_else(|| missing("a scene or points are needed (see holodrive print --help)"))?;
-    let path = args.plate.as_ref().ok_or_else(|| missing("--plate FILE is needed (see holodrive print --help)"))?;
+fn resolved(args: &PrintArgs) -> Result<PrintSettings> {
+    let missing = |what: &str| Error::parameter("print", format!("{what} (see holodrive print --help)"));
+    let input = args.input.clone().ok_or_else(|| missing("a scene or points are needed"))?;
+    let path = args.plate.as_ref().ok_or_else(|| missing("--plate FILE is needed"))?;
     let folder = match &args.output {
-        Some(folder) => folder.as_path(),
-        None if args.dry_run => Path::new(""),
-        None => return Err(missing("-o DIR is needed (see holodrive print --help)")),
+        None if !args.dry_run => return Err(missing("-o DIR is needed")),
+        folder => folder.clone().unwrap_or_default(),
     };
-    let kinds = ["gltf", "glb", "ply"];
-    if !input.extension().is_some_and(|e| kinds.iter().any(|kind| e.eq_ignore_ascii_case(kind))) {
-        return Err(Error::input(input, "is no scene (.gltf, .glb) or point cloud (.ply)"));
-    }
-    let plate = Plate::read(path)?;
-    let shard = match &args.shard {
-        Some(text) => Shard::parse(text, |name| std::env::var(name).ok())?,
-        None => Shard::default(),
-    };
-    let light = (&args.light.file, args.light.bounces, args.light.photons);
-    let task = task(input, light, args.light.white)?;
-    let settings = task.settings(&plate)?;
-    let there = if args.dry_run { None } else { job::look(folder, &settings)? };
-    let set = match &there {
-        None => InstructionSet::detect(),
-        Some(manifest) => instruction_set(folder, manifest)?,
-    };
-    let bar = Bar::new();
-    let progress = &bar.progress;
-    let mut report = Report::new("print");
-    report.add("plate", plate.name.clone(), "");
-    let white = there.as_ref().map(|m| m.white).filter(|w| *w > 0.0);
-    task.with(&plate, white, set, progress, |maker| {
-        let manifest = match there {
-            Some(manifest) => manifest,
-            None => {
-                let sampled = sample(maker, progress)?;
-                let planned = plan(maker, &sampled);
-                let free = files::free_space(folder);
-                let told = report_plan(&planned, &plate, set, free);
-                report.warn(planned.warnings.iter());
-                if let Some(free) = free.filter(|free| *free < planned.disk) {
-                    let what = format!("the disk has {} free: the work will stop when it is full", bytes(free));
-                    report.warn(std::iter::once(&what));
-                }
-                if args.dry_run {
-                    report.add_part("plan", "plan", told);
-                    return Ok(());
-                }
-                if !json {
-                    // Before the work, not after it.
-                    told.print(false)?;
-                }
-                report.add("plan", told.json(), "");
-                let white = if let Source::Scene(views) = maker.source { views.white() } else { 0.0 };
-                let mine = Manifest {
-                    settings,
-                    instruction_set: set.name().to_owned(),
-                    amplitude: sampled.amplitude,
-                    white,
-                    tiles: None,
-                };
-                let first = job::begin(folder, &mine)?;
-                if first.instruction_set != mine.instruction_set || first.amplitude != mine.amplitude {
-                    let what = "another machine with other kernels began this plate just now; give the command again";
-                    return Err(Error::input(folder, what));
-                }
-                first
-            }
-        };
-        let done = job::compute(folder, maker, &manifest, shard, progress)?;
-        let work = done.work;
-        let rates = [work.pixels as f64 / done.seconds.max(1e-9), work.pairs / work.field_seconds.max(1e-9)];
-        report.add_serialised("done", &done, "");
-        report.add("pixels_per_second", rates[0], "");
-        report.add("pairs_per_second", rates[1], "");
-        if done.torn > 0 {
-            let torn = done.torn;
-            report.add(
-                "torn",
-                torn,
-                format!("torn         {torn} tiles were not as they were written, and were redone"),
-            );
-        }
-        report.add(
-            "complete",
-            done.complete,
-            format!(
-                "tiles        {:>8}  {} computed, {} kept; {} of {} finished",
-                seconds(done.seconds),
-                done.computed,
-                done.kept,
-                done.finished,
-                done.tiles
-            ),
-        );
-        if done.computed > 0 {
-            let line = format!(
-                "rate         {:.2e} pixels/s; field {:.2e} point-pixel pairs/s; rays {}, field {}, fringe {}",
-                rates[0],
-                rates[1],
-                seconds(work.points_seconds),
-                seconds(work.field_seconds),
-                seconds(work.fringe_seconds)
-            );
-            report.add("rate", line.clone(), line);
-        }
-        let line = if done.complete {
-            format!("plate        {}", folder.join(job::PLATE).display())
-        } else {
-            "plate        not complete: other parts are missing".to_owned()
-        };
-        report.add("output", folder.display().to_string(), line);
-        Ok(())
-    })?;
-    Ok(report)
+    let light = &args.light;
+    Ok(PrintSettings {
+        plate: Plate::read(path)?,
+        input,
+        options: scene_options(&light.file, light.bounces, light.photons, light.white)?,
+        folder,
+        shard: match &args.shard {
+            Some(text) => Shard::parse(text, |name| std::env::var(name).ok())?,
+            None => Shard::default(),
+        },
+        dry_run: args.dry_run,
+    })
 }
 
-/// The set that the plate was begun with.
-fn instruction_set(folder: &Path, manifest: &Manifest) -> Result<InstructionSet> {
-    let name = &manifest.instruction_set;
-    InstructionSet::available().into_iter().find(|set| set.name() == name).ok_or_else(|| {
-        Error::input(
-            folder,
-            format!("was begun with {name} kernels, which this machine does not have; go on elsewhere"),
-        )
-    })
+fn compute(settings: PrintSettings, json: bool) -> Result<Report> {
+    let bar = Bar::new();
+    let mut report = Report::new("print");
+    let (plate, folder, dry_run) = (settings.plate.clone(), settings.folder.clone(), settings.dry_run);
+    report.value("plate", &plate.name);
+    let mut job = PlateJob::new(settings, &bar.progress)?;
+    if let Some(plan) = job.plan(&bar.progress)? {
+        report.warn(&plan.warnings);
+        let told = report_plan(&plan, &plate);
+        if dry_run {
+            report.add_part("plan", "plan", told);
+            return Ok(report);
+        }
+        if !json {
+            // Before the work, not after it.
+            told.print(false)?;
+        }
+        report.value("plan", told.json());
+    }
+    let printed = job.run(&bar.progress)?;
+    report.section(&printed);
+    let (done, work) = (&printed.done, &printed.done.work);
+    if done.torn > 0 {
+        let torn = done.torn;
+        report.add("torn", torn, format!("torn         {torn} tiles were not as they were written, and were redone"));
+    }
+    report.line(format!(
+        "tiles        {:>8}  {} computed, {} kept; {} of {} finished",
+        seconds(done.seconds),
+        done.computed,
+        done.kept,
+        done.finished,
+        done.tiles
+    ));
+    if done.computed > 0 {
+        let line = format!(
+            "rate         {:.2e} pixels/s; field {:.2e} point-pixel pairs/s; rays {}, field {}, fringe {}",
+            printed.pixels_per_second,
+            printed.pairs_per_second,
+            seconds(work.points_seconds),
+            seconds(work.field_seconds),
+            seconds(work.fringe_seconds)
+        );
+        report.add("rate", line.clone(), line);
+    }
+    let line = if done.complete {
+        format!("plate        {}", folder.join(folder::PLATE).display())
+    } else {
+        "plate        not complete: other parts are missing".to_owned()
+    };
+    report.add("output", folder.display().to_string(), line);
+    Ok(report)
 }
 
 fn duration(seconds: f64) -> String {
@@ -191,140 +125,143 @@ fn bytes(bytes: u64) -> String {
     }
 }
 
-fn report_plan(plan: &Plan, plate: &Plate, set: InstructionSet, free: Option<u64>) -> Report {
+fn lengths(wavelengths: &[f64]) -> String {
+    wavelengths.iter().map(|w| show_length(*w)).collect::<Vec<_>>().join(", ")
+}
+
+fn report_plan(plan: &Plan, plate: &Plate) -> Report {
     let mut report = Report::new("plan");
+    report.section(plan);
     let degrees = |angles: [f64; 2]| format!("{:.2} x {:.2} deg", angles[0].to_degrees(), angles[1].to_degrees());
-    let [width, height] = plan.size;
-    report.add_serialised(
-        "size",
-        &plan.size,
-        format!(
-            "plate        {} × {} px of {} × {}, {} bit, {:.2} × {:.2} mm",
-            width,
-            height,
-            show_length(plate.pitch_x),
-            show_length(plate.pitch_y),
-            plate.bits,
-            plan.extent[0] * 1e3,
-            plan.extent[1] * 1e3
-        ),
-    );
-    report.add_serialised("extent", &plan.extent, "");
-    report.add_serialised(
-        "diffraction_angle",
-        &plan.diffraction_angle,
-        format!(
-            "angles       the pitch diffracts ±{} at {}; object light ±{}",
-            degrees(plan.diffraction_angle),
-            show_length(plate.wavelength),
-            degrees(plan.object_angle)
-        ),
-    );
-    report.add_serialised("object_angle", &plan.object_angle, "");
-    report.add_serialised("reference_frequencies", &plan.reference, "");
-    report.add_serialised(
-        "tiles",
-        &plan.tiles,
-        format!(
-            "tiles        {} × {} of {} px; {} views of segments of {} px",
-            plan.tiles[0],
-            plan.tiles[1],
-            plate.tile,
-            count(plan.segments as usize),
-            plate.segment
-        ),
-    );
-    report.add("segments", plan.segments, "");
-    if let Some(slit) = &plate.slit {
-        report.add_serialised(
-            "slit",
-            slit,
-            format!(
-                "slit         {} high at {}, parallax from left to right; strips of {} rows for {}",
-                show_length(slit.height),
-                show_length(plate.viewer),
-                slit.strip,
-                slit.wavelengths.iter().map(|w| show_length(*w)).collect::<Vec<_>>().join(", ")
-            ),
-        );
+    report.line(format!(
+        "plate        {} × {} px of {} × {}, {} bit, {:.2} × {:.2} mm",
+        plan.size[0],
+        plan.size[1],
+        show_length(plate.raster.pitch_x),
+        show_length(plate.raster.pitch_y),
+        plate.fringe.bits,
+        plan.extent[0] * 1e3,
+        plan.extent[1] * 1e3
+    ));
+    report.line(format!(
+        "angles       the pitch diffracts ±{} at {}; object light ±{}",
+        degrees(plan.diffraction_angle),
+        show_length(plate.wavelength),
+        degrees(plan.object_angle)
+    ));
+    report.line(format!(
+        "tiles        {} × {} of {} px; {} views of segments of {} px",
+        plan.tiles[0],
+        plan.tiles[1],
+        plate.file.tile,
+        count(plan.segments as usize),
+        plate.segment
+    ));
+    if let Some(slit) = &plan.slit {
+        report.line(format!(
+            "slit         {} high at {}, parallax from left to right; strips of {} rows for {}",
+            show_length(slit.height),
+            show_length(plate.view.viewer),
+            slit.strip,
+            lengths(&slit.wavelengths)
+        ));
     }
-    report.add_serialised(
-        "points",
-        &plan.points,
-        format!(
-            "points       {} a segment ({} at most); about {} rays",
-            count(plan.points[0] as usize),
-            count(plan.points[1] as usize),
-            count(plan.rays as usize)
-        ),
-    );
-    report.add("rays", plan.rays, "");
-    report.add("pairs", plan.pairs, format!("pairs        {:.2e} points times pixels", plan.pairs));
-    report.add("amplitude", plan.amplitude, "");
-    let of = free.map(|free| format!(" of {} free", bytes(free))).unwrap_or_default();
-    report.add(
-        "memory",
-        plan.memory,
-        format!("memory       about {}; disk {}{of}", bytes(plan.memory), bytes(plan.disk)),
-    );
-    report.add("disk", plan.disk, "");
-    report.add_serialised("disk_free", &free, "");
-    report.add_serialised("files", &plan.files, "");
-    report.add_serialised("resolution", &plan.resolution, "");
-    report.add("instruction_set", set.name(), "");
-    report.add(
-        "seconds",
-        plan.seconds,
-        format!(
-            "time         about {} on this machine, {} on 100 like it",
-            duration(plan.seconds),
-            duration(plan.seconds_on_100)
-        ),
-    );
-    report.add("seconds_on_100", plan.seconds_on_100, "");
+    report.line(format!(
+        "points       {} a segment ({} at most); about {} rays",
+        count(plan.points[0] as usize),
+        count(plan.points[1] as usize),
+        count(plan.rays as usize)
+    ));
+    report.line(format!("pairs        {:.2e} points times pixels", plan.pairs));
+    let of = plan.disk_free.map(|free| format!(" of {} free", bytes(free))).unwrap_or_default();
+    report.line(format!("memory       about {}; disk {}{of}", bytes(plan.memory), bytes(plan.disk)));
+    report.line(format!(
+        "time         about {} on this machine, {} on 100 like it",
+        duration(plan.seconds),
+        duration(plan.seconds_on_100)
+    ));
     report
 }
 
 fn verify(args: &VerifyArgs) -> Result<Report> {
     let mut report = Report::new("print verify");
     let bar = Bar::new();
-    let found = job::verify(&args.folder, &bar.progress)?;
-    report.add_serialised("verified", &found, "");
-    report.add(
-        "tiles",
+    let found = folder::verify(&args.folder, &bar.progress)?;
+    report.value("verified", &found);
+    let line = format!(
+        "verified     {} tiles, {}, all as they were computed, in {}",
         found.tiles,
-        format!(
-            "verified     {} tiles, {}, all as they were computed, in {}",
-            found.tiles,
-            bytes(found.bytes),
-            seconds(found.seconds)
-        ),
+        bytes(found.bytes),
+        seconds(found.seconds)
     );
+    report.add("tiles", found.tiles, line);
+    Ok(report)
+}
+
+/// `name.png` → `name-traced.png`.
+fn beside(path: &Path) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}-traced.png"))
+}
+
+fn preview(args: &PreviewArgs) -> Result<Report> {
+    let mut report = Report::new("print preview");
+    let settings = PreviewSettings {
+        eye: args.eye,
+        pupil: args.pupil,
+        focus: args.focus,
+        size: args.size,
+        part: args.part,
+        wavelength: args.wavelength,
+        memory: args.memory,
+    };
+    let place = Manifest::of(&args.folder)?.settings.plate.view.place;
+    report.check_side("focus", args.focus, Some([place; 2]));
+    let bar = Bar::new();
+    let mut view = PlateView::new(&args.folder, &settings, &bar.progress)?;
+    view.write_png(&args.output, args.white)?;
+    let seen = &view.report;
+    if seen.dazzled {
+        report.warn(["the lamp's own light goes through the plate into this pupil; move the eye out of it"]);
+    }
+    report.line(format!(
+        "simulated view in focus at z = {}, {:.2} × {:.2} mm, in the light of {}, one column of {} and one row of {} \
+         of light kept, in {}",
+        show_length(seen.focus),
+        seen.half[0] * 2e3,
+        seen.half[1] * 2e3,
+        lengths(&seen.wavelengths),
+        seen.thinned[0],
+        seen.thinned[1],
+        seconds(seen.seconds)
+    ));
+    if let Some(scene) = &args.traced {
+        let path = beside(&args.output);
+        let [alike, smooth] = view.compare(scene, &path, &bar.progress)?;
+        let line =
+            format!("traced       {}: SSIM {:.3}, over 4 × 4 cells {:.3}", path.display(), alike.ssim, smooth.ssim);
+        report.add("traced", path.display().to_string(), line);
+    }
+    report.section(&view.report);
+    report.output("picture", &args.output);
     Ok(report)
 }
 
 fn write(args: &ExportArgs) -> Result<Report> {
     let mut report = Report::new("print export");
-    let frames = || {
-        let (width, height) =
-            args.frame.ok_or_else(|| Error::parameter("frame", "give the size of an exposure, --frame 1920x1080"))?;
-        Ok::<_, Error>(Frames {
-            size: [width as u64, height as u64],
-            overlap: args.overlap,
-            serpentine: args.serpentine,
-            window: args.window,
-        })
-    };
-    let format = match args.format {
-        ExportFormat::Zarr => Format::Zarr,
-        ExportFormat::Png => Format::Png(frames()?),
-        ExportFormat::Bmp => Format::Bmp(frames()?),
-        ExportFormat::Gds => Format::Gds,
-    };
+    if args.frame.is_none() && matches!(args.format, Format::Png | Format::Bmp) {
+        return Err(Error::parameter("frame", "give the size of an exposure, --frame 1920x1080"));
+    }
+    let frames = args.frame.map(|(width, height)| Frames {
+        size: [width as u64, height as u64],
+        overlap: args.overlap,
+        serpentine: args.serpentine,
+        window: args.window,
+    });
     let bar = Bar::new();
-    let written = export(&args.folder, &format, &args.output, &bar.progress)?;
-    report.add("files", written.files, format!("files        {}, {}", written.files, bytes(written.bytes)));
-    report.add("bytes", written.bytes, "");
-    report.add("output", args.output.display().to_string(), format!("written      {}", args.output.display()));
+    let written = export(&args.folder, args.format, frames.as_ref(), &args.output, &bar.progress)?;
+    report.section(&written);
+    report.line(format!("files        {}, {}", written.files, bytes(written.bytes)));
+    report.output("written", &args.output);
     Ok(report)
 }

@@ -84,7 +84,7 @@ pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
         return Ok(report);
     }
     if let Some(segment) = args.views {
-        super::true_views::compute(args, (&source, segment), &setup, &bar.progress, &mut report)?;
+        super::segment_views::compute(args, &source, segment, &setup, &bar.progress, &mut report)?;
         return Ok(report);
     }
     let settings = Settings {

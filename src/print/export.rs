@@ -1,12 +1,14 @@
 //! A finished plate in other formats, streamed from its file: Zarr, frames for fringe printers, GDSII.
 
-use super::job;
+use super::folder::open;
+use super::geometry::file_raster;
 use super::manifest::Manifest;
-use super::plate::Plate;
-use super::tiff::{Layout, read_at, unpacked};
+use super::plate::{Plate, Raster};
+use super::tiff::{Layout, packed, read_at, unpacked};
 use super::{gds, zarr};
 use crate::error::{Error, Result};
 use crate::files;
+use crate::names::{Name, Named};
 use crate::progress::Progress;
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -33,7 +35,7 @@ impl Reader {
     /// # Errors
     /// Those of a plate that is missing, incomplete or damaged.
     pub fn open(folder: &Path) -> Result<Self> {
-        let (manifest, layout, file, path) = job::open(folder)?;
+        let (manifest, layout, file, path) = open(folder)?;
         Ok(Self { manifest, layout, file, path, kept: VecDeque::new() })
     }
     /// The plate.
@@ -48,9 +50,9 @@ impl Reader {
     pub fn tiles(&self) -> u64 {
         self.layout.tiles
     }
-    /// Columns and rows of the file.
-    pub fn size(&self) -> [u64; 2] {
-        super::geometry::file_size(self.plate())
+    /// The pixels of the file.
+    pub fn raster(&self) -> Raster {
+        file_raster(self.plate())
     }
     /// The levels of a tile as the file shows it.
     ///
@@ -61,7 +63,7 @@ impl Reader {
             return Ok(Arc::clone(levels));
         }
         let bytes = read_at(&self.file, &self.path, self.layout.offset(index), self.layout.tile_bytes)?;
-        let levels = Arc::new(unpacked(&bytes, self.plate().bits));
+        let levels = Arc::new(unpacked(&bytes, self.plate().fringe.bits));
         while (self.kept.len() + 1) * levels.len() > KEPT && !self.kept.is_empty() {
             self.kept.pop_front();
         }
@@ -73,8 +75,8 @@ impl Reader {
     /// # Errors
     /// [`Error::Io`].
     pub fn rectangle(&mut self, [column, row]: [u64; 2], [width, height]: [u64; 2]) -> Result<Vec<u8>> {
-        let tile = self.plate().tile;
-        let [file_width, file_height] = self.size();
+        let tile = self.plate().file.tile;
+        let Raster { width: file_width, height: file_height, .. } = self.raster();
         let across = file_width.div_ceil(tile);
         let mut out = vec![0u8; (width * height) as usize];
         for tile_row in row / tile..(row + height).min(file_height).div_ceil(tile) {
@@ -95,16 +97,26 @@ impl Reader {
 }
 
 /// A format to export to.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Zarr version 3, a shard for each tile; one bit is packed.
     Zarr,
     /// PNG frames.
-    Png(Frames),
+    Png,
     /// BMP frames.
-    Bmp(Frames),
+    Bmp,
     /// GDSII: a rectangle for each run of open pixels.
     Gds,
+}
+
+impl Named for Format {
+    const KIND: &'static str = "format";
+    const NAMES: &'static [Name<Self>] = &[
+        ("zarr", || Self::Zarr, "Zarr version 3: a shard a tile, one bit packed"),
+        ("png", || Self::Png, "PNG frames"),
+        ("bmp", || Self::Bmp, "BMP frames"),
+        ("gds", || Self::Gds, "GDSII rectangles, for small masks"),
+    ];
 }
 
 /// How a plate is cut into exposures.
@@ -129,17 +141,25 @@ pub struct Exported {
     pub bytes: u64,
 }
 
-/// Writes a finished plate in another format to `output`.
+/// Writes a finished plate in another format to `output`; pictures are cut into `frames`.
 ///
 /// # Errors
 /// Those of a plate that is missing, incomplete or damaged; [`Error::Parameter`] for a format that cannot hold it; [`Error::Io`].
-pub fn export(folder: &Path, format: &Format, output: &Path, progress: &Progress) -> Result<Exported> {
+pub fn export(
+    folder: &Path,
+    format: Format,
+    frames: Option<&Frames>,
+    output: &Path,
+    progress: &Progress,
+) -> Result<Exported> {
     let mut reader = Reader::open(folder)?;
     match format {
         Format::Zarr => zarr::write(&mut reader, output, progress),
         Format::Gds => gds::write(&mut reader, output, progress),
-        Format::Png(frames) => write_frames(&mut reader, frames, output, "png", progress),
-        Format::Bmp(frames) => write_frames(&mut reader, frames, output, "bmp", progress),
+        Format::Png | Format::Bmp => {
+            let frames = frames.ok_or_else(|| Error::parameter("frame", "the size of an exposure is needed"))?;
+            write_frames(&mut reader, frames, output, format, progress)
+        }
     }
 }
 
@@ -159,7 +179,7 @@ fn write_frames(
     reader: &mut Reader,
     frames: &Frames,
     output: &Path,
-    extension: &str,
+    format: Format,
     progress: &Progress,
 ) -> Result<Exported> {
     let [width, height] = frames.size;
@@ -174,18 +194,14 @@ fn write_frames(
         return Err(Error::parameter("overlap", format!("{} is more than half of a frame", frames.overlap)));
     }
     let plate = reader.plate().clone();
-    if frames.window && (plate.bits == 1 || frames.overlap == 0) {
+    if frames.window && (plate.fringe.bits == 1 || frames.overlap == 0) {
         return Err(Error::parameter(
             "window",
             "levels fall over an overlap of 8-bit frames; this plate or overlap has none",
         ));
     }
-    let size = reader.size();
-    let [pitch_x, pitch_y] = if plate.rotation.is_multiple_of(180) {
-        [plate.pitch_x, plate.pitch_y]
-    } else {
-        [plate.pitch_y, plate.pitch_x]
-    };
+    let Raster { width: file_width, height: file_height, pitch_x, pitch_y } = reader.raster();
+    let size = [file_width, file_height];
     let step = [width - frames.overlap, height - frames.overlap];
     let count = |size: u64, step: u64| (size.saturating_sub(frames.overlap)).div_ceil(step).max(1);
     let counts = [count(size[0], step[0]), count(size[1], step[1])];
@@ -204,10 +220,10 @@ fn write_frames(
                 let last = [across + 1 == counts[0], down + 1 == counts[1]];
                 window(&mut levels, frames, first, last);
             }
-            let name = format!("frame-{down:05}-{across:05}.{extension}");
-            let bytes = match extension {
-                "bmp" => bmp(&levels, frames.size, plate.bits, [pitch_x, pitch_y]),
-                _ => png_bytes(&levels, frames.size, plate.bits, [pitch_x, pitch_y], &output.join(&name))?,
+            let name = format!("frame-{down:05}-{across:05}.{}", format.name());
+            let bytes = match format {
+                Format::Bmp => bmp(&levels, frames.size, plate.fringe.bits, [pitch_x, pitch_y]),
+                _ => png_bytes(&levels, frames.size, plate.fringe.bits, [pitch_x, pitch_y], &output.join(&name))?,
             };
             files::write_bytes(&output.join(&name), &bytes)?;
             written.files += 1;
@@ -228,7 +244,7 @@ fn write_frames(
         "size": size,
         "pitch": [pitch_x, pitch_y],
         "wavelength": plate.wavelength,
-        "bits": plate.bits,
+        "bits": plate.fringe.bits,
         "frame": frames.size,
         "overlap": frames.overlap,
         "window": if frames.window { "linear" } else { "none" },
@@ -264,10 +280,7 @@ fn window(levels: &mut [u8], frames: &Frames, first: [bool; 2], last: [bool; 2])
 
 /// Rows of levels, each padded to whole bytes, the first pixel high.
 fn rows(levels: &[u8], width: u64, bits: u8) -> impl Iterator<Item = Vec<u8>> {
-    levels.chunks_exact(width as usize).map(move |row| match bits {
-        1 => row.chunks(8).map(|eight| eight.iter().enumerate().fold(0, |b, (i, &l)| b | l << (7 - i))).collect(),
-        _ => row.to_vec(),
-    })
+    levels.chunks_exact(width as usize).map(move |row| packed(row, bits))
 }
 
 fn png_bytes(levels: &[u8], [width, height]: [u64; 2], bits: u8, pitch: [f64; 2], path: &Path) -> Result<Vec<u8>> {

@@ -4,6 +4,7 @@
 //! Runs of open pixels that are the same in the rows below become one rectangle.
 
 use super::export::{Exported, Reader};
+use super::plate::Raster;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::progress::Progress;
@@ -15,8 +16,8 @@ const MOST: u64 = 1 << 26;
 
 pub(super) fn write(reader: &mut Reader, output: &Path, progress: &Progress) -> Result<Exported> {
     let plate = reader.plate().clone();
-    let [width, height] = reader.size();
-    if plate.bits != 1 {
+    let Raster { width, height, .. } = reader.raster();
+    if plate.fringe.bits != 1 {
         return Err(Error::parameter(
             "as",
             "gds holds open and closed pixels; this plate has 8 bits: print it with bits = 1",
@@ -28,10 +29,10 @@ pub(super) fn write(reader: &mut Reader, output: &Path, progress: &Progress) -> 
         );
         return Err(Error::parameter("as", what));
     }
-    if plate.pitch_x != plate.pitch_y {
+    if plate.raster.pitch_x != plate.raster.pitch_y {
         let what = format!(
             "gds counts in one database unit, the pitch is {} × {} m: not square",
-            plate.pitch_x, plate.pitch_y
+            plate.raster.pitch_x, plate.raster.pitch_y
         );
         return Err(Error::parameter("as", what));
     }
@@ -44,7 +45,8 @@ pub(super) fn write(reader: &mut Reader, output: &Path, progress: &Progress) -> 
         out.words(0x0102, &date)?;
         out.text(0x0206, "PLATE")?;
         // The database unit in micrometres and in metres.
-        let units: Vec<u8> = [plate.pitch_x / 1e-6, plate.pitch_x].iter().flat_map(|v| real(*v)).collect();
+        let units: Vec<u8> =
+            [plate.raster.pitch_x / 1e-6, plate.raster.pitch_x].iter().flat_map(|v| real(*v)).collect();
         out.record(0x0305, &units)?;
         out.words(0x0502, &date)?;
         out.text(0x0606, "FRINGES")?;

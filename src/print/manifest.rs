@@ -3,6 +3,7 @@
 use super::plate::Plate;
 use crate::error::{Error, Result};
 use crate::files;
+use crate::segments::{SceneOptions, is_cloud};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -36,7 +37,7 @@ pub struct Settings {
     pub plate: Plate,
     /// Scene or points and what they are made of.
     pub inputs: Vec<Input>,
-    /// Other settings, as flags name them.
+    /// How the scene is lit.
     pub options: BTreeMap<String, Value>,
 }
 
@@ -56,10 +57,28 @@ pub struct Manifest {
 }
 
 impl Settings {
-    /// Settings for this program.
-    pub fn new(plate: &Plate, inputs: Vec<Input>, options: BTreeMap<String, Value>) -> Self {
+    /// What decides a plate of a scene or of points.
+    ///
+    /// # Errors
+    /// [`Error::Io`] for files that cannot be read.
+    pub fn new(plate: &Plate, input: &Path, options: &SceneOptions) -> Result<Self> {
         let program = concat!("holodrive ", env!("CARGO_PKG_VERSION")).to_owned();
-        Self { program, plate: plate.clone(), inputs, options }
+        // Points are neither seen by a camera nor lit.
+        let options = if is_cloud(input) { Value::Null } else { serde_json::to_value(options).unwrap_or_default() };
+        let options = options.as_object().into_iter().flatten().map(|(key, value)| (key.clone(), value.clone()));
+        Ok(Self { program, plate: plate.clone(), inputs: inputs(input)?, options: options.collect() })
+    }
+
+    /// How the scene of a plate was lit.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when the file is not the one that the plate was made of.
+    pub fn options_for(&self, input: &Path) -> Result<SceneOptions> {
+        if inputs(input)? != self.inputs {
+            return Err(Error::input(input, "is not the file that the plate was made of, or has changed since"));
+        }
+        let options = Value::Object(self.options.clone().into_iter().collect());
+        serde_json::from_value(options).map_err(|e| Error::input(input, format!("was lit in an unknown way: {e}")))
     }
 
     /// The first setting in which two differ, with both values; numbers are compared as they are written.
@@ -180,7 +199,7 @@ fn hex(bytes: &[u8]) -> String {
 ///
 /// # Errors
 /// [`Error::Io`] for files that cannot be read.
-pub fn inputs(path: &Path) -> Result<Vec<Input>> {
+fn inputs(path: &Path) -> Result<Vec<Input>> {
     let hash = |path: &Path| -> Result<String> {
         let mut file = File::open(path).map_err(Error::io(path))?;
         let mut digest = Sha256::new();

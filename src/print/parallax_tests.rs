@@ -1,13 +1,10 @@
-//! Slits: depth from left to right, darkness above and below, colours in their places. True views on a panel.
+//! Slits: depth from left to right, darkness above and below, colours in their places.
 
-use super::fringe::HALO;
 use super::preview::{PreviewSettings, preview};
-use super::tests::{folder_of, maker, point, spot, whole};
+use super::tests::{folder_of, fringes, point, settings, spot, whole};
 use super::*;
-use crate::field::{Field, Grid};
-use crate::hologram::InstructionSet;
 use crate::progress::Progress;
-use std::collections::BTreeMap;
+use crate::segments::Object;
 use std::path::Path;
 
 /// A plate of 1.0 × 1.2 mm whose slit stands 30 mm before it, and its lamp above.
@@ -47,7 +44,7 @@ fn through_a_slit_points_stand_at_their_depth_from_left_to_right_and_each_colour
                 eye,
                 pupil: 0.6e-3,
                 focus: z,
-                size: (200, 200),
+                size: Some((200, 200)),
                 part: None,
                 wavelength,
                 memory: 1 << 30,
@@ -96,18 +93,17 @@ fn strips_of_three_colours_keep_to_their_lasers_and_any_cut_gives_the_same_fring
         vec![point(0.0, height(10.0) * 1.1, -3e-3)],
         vec![point(120e-6, height(11.0) * 1.1, -3e-3)],
     ];
-    let source = Source::ColorCloud(all);
-    let made = maker(&plate, &source);
-    let settings = Settings::new(&plate, Vec::new(), BTreeMap::new());
-    let manifest = Manifest { settings, instruction_set: "x".into(), amplitude: 0.5, white: 0.0, tiles: None };
-    let manifest = job::begin(folder.path(), &manifest).expect("manifest");
-    job::compute(folder.path(), &made, &manifest, Shard::default(), &Progress::new()).expect("plate");
+    let made = fringes(&plate, Object::ColorPoints(all.clone()));
+    let manifest =
+        Manifest { settings: settings(&plate), instruction_set: "x".into(), amplitude: 0.5, white: 0.0, tiles: None };
+    let manifest = folder::begin(folder.path(), &manifest).expect("manifest");
+    folder::compute(folder.path(), &made, &manifest, Shard::default(), &Progress::new()).expect("plate");
     for (wavelength, x) in [(638e-9, -120e-6), (520e-9, 0.0), (450e-9, 120e-6)] {
         let settings = PreviewSettings {
             eye: [0.0, 0.0, 30e-3],
             pupil: 0.6e-3,
             focus: -3e-3,
-            size: (200, 200),
+            size: Some((200, 200)),
             part: None,
             wavelength: Some(wavelength),
             memory: 1 << 30,
@@ -123,10 +119,10 @@ fn strips_of_three_colours_keep_to_their_lasers_and_any_cut_gives_the_same_fring
         let elsewhere = sum(&mut (0..200 * 200).filter(away)) / sum(&mut (0..200 * 200));
         assert!(elsewhere < 0.1, "{wavelength}: {elsewhere} of the light is other points'");
     }
-    let expected = whole(&made, 0.5, HALO);
+    let expected = whole(&made, 0.5);
     for tile in [192, 384] {
-        let plate = Plate { tile, ..plate.clone() };
-        assert!(whole(&maker(&plate, &source), 0.5, HALO) == expected, "tiles of {tile}");
+        let plate = Plate { file: FileLayout { tile, ..plate.file }, ..plate.clone() };
+        assert!(whole(&fringes(&plate, Object::ColorPoints(all.clone())), 0.5) == expected, "tiles of {tile}");
     }
 }
 
@@ -138,7 +134,7 @@ fn slits_that_do_not_fit_are_refused() {
                     [scene]\nviewer = \"30mm\"\ndistance = \"3mm\"\n";
         let text = text.replace(from, to);
         match Plate::parse(&text, Path::new("t.toml")) {
-            Ok(plate) => Band::of(&plate).expect_err(to).to_string(),
+            Ok(plate) => plate.segments().expect_err(to).to_string(),
             Err(error) => error.to_string(),
         }
     };
@@ -154,77 +150,4 @@ fn slits_that_do_not_fit_are_refused() {
         let said = refuse(from, to);
         assert!(said.contains(expected) && !said.contains('\n'), "{to}: {said}");
     }
-}
-
-/// Likeness of two pictures' shapes, −1 to 1.
-fn correlation(a: &[f32], b: &[f32]) -> f64 {
-    let mean = |v: &[f32]| v.iter().map(|x| f64::from(*x)).sum::<f64>() / v.len() as f64;
-    let (ma, mb) = (mean(a), mean(b));
-    let product = |a: &[f32], ma: f64, b: &[f32], mb: f64| -> f64 {
-        a.iter().zip(b).map(|(x, y)| (f64::from(*x) - ma) * (f64::from(*y) - mb)).sum()
-    };
-    product(a, ma, b, mb) / (product(a, ma, a, ma) * product(b, mb, b, mb)).sqrt()
-}
-
-#[test]
-fn true_views_on_a_panel_show_the_model_that_points_show_and_do_not_change_with_the_segments() {
-    use crate::points::Placement;
-    use crate::reconstruction::metrics::blocks;
-    use crate::reconstruction::{View, ViewSettings, picture};
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.gltf");
-    let grid = Grid::new(600, 400, 8e-6, 8e-6).expect("grid");
-    let progress = Progress::new();
-    let of = |segment: u64| PanelViews {
-        grid,
-        wavelength: 633e-9,
-        viewer: 0.1,
-        place: -0.06,
-        scale: None,
-        segment,
-        error: 5e-3,
-        seed: 1,
-    };
-    let task = Task::new(scene.clone());
-    let seen = |segment| of(segment).field(&task, InstructionSet::detect(), &progress).expect("field");
-    let (coarse, fine) = (seen(200), seen(50));
-    assert!(coarse.work.segments == 6 && fine.work.segments == 96, "{:?} {:?}", coarse.work, fine.work);
-    let settings = crate::points::SceneSettings {
-        placement: Placement::Model { eye: 0.1, z: -0.06, scale: None },
-        trace: crate::points::trace::TraceSettings { width: 300, height: 200, ..Default::default() },
-        ..Default::default()
-    };
-    let mut profile = crate::panel::PanelProfile::generic().expect("generic");
-    (profile.width, profile.height) = (grid.width, grid.height);
-    (profile.pitch_x, profile.pitch_y) = (grid.pitch_x, grid.pitch_y);
-    let setup = crate::panel::Setup::new(profile, Some(633e-9)).expect("setup");
-    let lit = crate::pipeline::points(&scene, &settings, &setup, &progress).expect("points");
-    let [exposure] = crate::pipeline::exposures(&setup, &crate::pipeline::Settings::default(), None)[..] else {
-        panic!("one laser, one exposure")
-    };
-    let engine = crate::hologram::HologramSettings::default();
-    let plain = crate::pipeline::field(&lit.placed.cloud, &exposure, &setup, &engine, &progress).expect("field");
-    let plain = plain.expect("light");
-    // On the plane of the scene's middle, as large as the panel shows it; speckle is averaged over blocks.
-    let half = glam::DVec2::new(3.6e-3, 2.4e-3);
-    let look = |field: &Field| {
-        let view = View::Plane { z: -0.06 };
-        let seen = picture(field, &view, half, (240, 160), &ViewSettings::default(), &progress).expect("picture");
-        blocks(&seen, 8)
-    };
-    let (a, b, c) = (look(&coarse.field), look(&fine.field), look(&plain.field));
-    let mirrored: Vec<f32> = c.values.chunks_exact(c.width).flat_map(|row| row.iter().rev().copied()).collect();
-    let flipped: Vec<f32> = c.values.chunks_exact(c.width).rev().flatten().copied().collect();
-    for (name, seen) in [("coarse", &a), ("fine", &b)] {
-        let like = correlation(&seen.values, &c.values);
-        let wrong = correlation(&seen.values, &mirrored).max(correlation(&seen.values, &flipped));
-        assert!(like > 0.85 && like > wrong + 0.1, "{name}: {like}, mirrored or flipped {wrong}");
-    }
-    // The same cells, the same points and phases: speckle itself is alike.
-    let grains = correlation(
-        &coarse.field.samples.iter().map(|u| u.re).collect::<Vec<_>>(),
-        &fine.field.samples.iter().map(|u| u.re).collect::<Vec<_>>(),
-    );
-    assert!(grains > 0.8, "{grains}");
-    let cloud = PanelViews { segment: 10, ..of(50) }.field(&task, InstructionSet::detect(), &progress);
-    assert!(cloud.unwrap_err().to_string().contains("give 16 to 400"));
 }

@@ -1,16 +1,18 @@
 //! What a plate will take, and every reason why it would be wrong: found on a few small fields before the work.
 
-use super::fringe::{Maker, Work};
-use super::geometry::{Piece, Rect, file_size, fringe_area, tile_counts};
+use super::fringe::PlateFringes;
+use super::geometry::{file_raster, fringe_area, tile_counts};
 use super::plate::{Binarisation, Quantity};
-use super::reference::{Band, Reference};
+use super::reference::Reference;
 use super::tiff::{Layout, resolution};
-use super::views::Source;
 use crate::encode::fringe::order_statistic;
 use crate::error::{Error, Result};
 use crate::field::Complex32;
+use crate::files;
 use crate::progress::Progress;
+use crate::segments::{Object, ObjectBand, Piece, Rect, Slit, Work};
 use serde::Serialize;
+use std::path::Path;
 use std::time::Instant;
 
 /// Segments looked at along each side of the plate.
@@ -19,24 +21,23 @@ const LATTICE: i64 = 4;
 const PATCH: i64 = 192;
 
 /// What a few small fields of the plate show.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Sample {
+#[derive(Default)]
+struct Sample {
     /// Amplitude of the object that swings the fringe fully, to four digits.
-    pub amplitude: f32,
-    /// Share of the sampled pixels whose amplitude is larger.
-    pub clipped: f64,
+    amplitude: f32,
     /// Most points of one segment.
-    pub most_points: u64,
+    most_points: u64,
     /// What the fields took.
-    pub work: Work,
+    work: Work,
     /// What the whole of the segment with the most points took: small fields do not tell the speed of large ones.
-    pub whole: Work,
+    whole: Work,
     /// Segments of the plate.
-    pub segments: u64,
+    segments: u64,
 }
 
 /// What will be done.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Plan {
     /// Pixels of the file across and down.
     pub size: [u64; 2],
@@ -57,7 +58,10 @@ pub struct Plan {
     /// Largest angle that the pitch diffracts, along x and y [rad].
     pub diffraction_angle: [f64; 2],
     /// Lowest and highest spatial frequency of the reference along x and y [cycles/m].
-    pub reference: [[f64; 2]; 2],
+    pub reference_frequencies: [[f64; 2]; 2],
+    /// The slit, where the plate has parallax from left to right only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slit: Option<Slit>,
     /// Amplitude that swings the fringe fully.
     pub amplitude: f32,
     /// Time on this machine, measured on the samples [s].
@@ -68,49 +72,44 @@ pub struct Plan {
     pub memory: u64,
     /// Length of the file [bytes].
     pub disk: u64,
+    /// Free space where the folder is [bytes], if the system tells.
+    pub disk_free: Option<u64>,
     /// Files that will be there.
     pub files: Vec<String>,
     /// Pixels a centimetre along x and y, as fractions.
     pub resolution: [[u32; 2]; 2],
+    /// Instruction set of the kernels.
+    pub instruction_set: &'static str,
     /// What a user should know.
+    #[serde(skip)]
     pub warnings: Vec<String>,
 }
 
 /// Computes small fields in segments all over the plate.
-///
-/// # Errors
-/// [`Error::Parameter`] when no point is seen from any of them; those of [`Maker::field`].
-pub fn sample(maker: &Maker, progress: &Progress) -> Result<Sample> {
-    let plate = maker.plate;
+fn sample(fringes: &PlateFringes, progress: &Progress) -> Result<Sample> {
+    let plate = &fringes.plate;
     let area = fringe_area(plate);
-    let sides = plate.segment_size().map(|side| side as i64);
+    let sides = fringes.wave.plane.size.map(|side| side as i64);
     let across = |range: [i64; 2], side: i64| [range[0].div_euclid(side), (range[1] - 1).div_euclid(side)];
     let (columns, rows) = (across(area.x, sides[0]), across(area.y, sides[1]));
     let pick = |[first, last]: [i64; 2], i: i64| first + ((2 * i + 1) * (last - first + 1)) / (2 * LATTICE);
     let mut places: Vec<[i64; 2]> =
         (0..LATTICE * LATTICE).map(|i| [pick(columns, i % LATTICE), pick(rows, i / LATTICE)]).collect();
-    if let Source::Cloud(points) | Source::ColorCloud([points, ..]) = maker.source {
+    if let Some(points) = fringes.wave.object.clouds().first() {
         // The light of points near the plate is where they are: a lattice of places may miss it.
         let count = points.len();
         for point in (0..16).filter_map(|i| points.get((2 * i + 1) * count / 32)) {
-            let column = (point.position.x / plate.pitch_x + 0.5 * plate.width as f64).floor() as i64;
-            let row = (0.5 * plate.height as f64 - point.position.y / plate.pitch_y).floor() as i64;
-            if (area.x[0]..area.x[1]).contains(&column) && (area.y[0]..area.y[1]).contains(&row) {
-                places.push([column.div_euclid(sides[0]), row.div_euclid(sides[1])]);
+            let grid = &fringes.wave.plane.grid;
+            let pixel = [grid.column(point.position.x), grid.row(point.position.y)].map(|at| at.round() as i64);
+            if area.contains(pixel) {
+                places.push([pixel[0].div_euclid(sides[0]), pixel[1].div_euclid(sides[1])]);
             }
         }
     }
     places.sort_unstable();
     places.dedup();
     progress.start("samples", places.len() as u64);
-    let mut sample = Sample {
-        amplitude: 0.0,
-        clipped: 0.0,
-        most_points: 0,
-        work: Work::default(),
-        whole: Work::default(),
-        segments: 0,
-    };
+    let mut sample = Sample::default();
     let mut busiest = None;
     let mut samples: Vec<f32> = Vec::new();
     for segment in places {
@@ -124,7 +123,7 @@ pub fn sample(maker: &Maker, progress: &Progress) -> Result<Sample> {
         if rect.area() == 0 {
             continue;
         }
-        let (field, work) = maker.field(&rect, &[Piece { segment, rect }], progress)?;
+        let (field, work) = fringes.wave.field(&rect, &[Piece { segment, rect }], progress)?;
         if work.points > sample.most_points {
             (sample.most_points, busiest) = (work.points, Some(segment));
         }
@@ -132,7 +131,7 @@ pub fn sample(maker: &Maker, progress: &Progress) -> Result<Sample> {
         samples.extend(field.iter().map(|u: &Complex32| u.norm()));
     }
     if sample.work.points == 0 {
-        let [x, y] = maker.band.angle.map(f64::to_degrees);
+        let [x, y] = fringes.wave.plane.band.angle.map(f64::to_degrees);
         let what = format!(
             "none is seen from the plate within the {x:.2} deg × {y:.2} deg that it diffracts; move the scene or the viewer"
         );
@@ -143,13 +142,13 @@ pub fn sample(maker: &Maker, progress: &Progress) -> Result<Sample> {
             [(index * side).max(bounds[0]), ((index + 1) * side).min(bounds[1])]
         };
         let rect = Rect { x: span(segment[0], sides[0], area.x), y: span(segment[1], sides[1], area.y) };
-        let (field, work) = maker.field(&rect, &[Piece { segment, rect }], progress)?;
+        let (field, work) = fringes.wave.field(&rect, &[Piece { segment, rect }], progress)?;
         sample.whole = work;
         let begin = Instant::now();
-        maker.levels(&field, &rect, 1.0);
+        fringes.levels(&field, &rect, 1.0);
         sample.whole.fringe_seconds = begin.elapsed().as_secs_f64();
     }
-    let rank = (samples.len().saturating_sub(1) as f64 * plate.percentile).round() as usize;
+    let rank = (samples.len().saturating_sub(1) as f64 * plate.fringe.percentile).round() as usize;
     let amplitude = order_statistic(&mut samples, rank);
     // Four digits, so that the manifest's decimals are the very number that is used.
     let amplitude: f32 = format!("{amplitude:.3e}").parse().unwrap_or(amplitude);
@@ -158,20 +157,24 @@ pub fn sample(maker: &Maker, progress: &Progress) -> Result<Sample> {
         return Err(Error::parameter("points", what));
     }
     sample.amplitude = amplitude;
-    sample.clipped = samples.iter().filter(|a| **a > amplitude).count() as f64 / samples.len() as f64;
     // Tiles need not begin where segments do; then a segment is looked from in each tile that it lies in.
     let [tiles_x, tiles_y] = tile_counts(plate);
-    let per_tile = |side: u64| plate.tile.div_ceil(side) + u64::from(!plate.tile.is_multiple_of(side));
-    let [wide, tall] = plate.segment_size();
+    let per_tile = |side: u64| plate.file.tile.div_ceil(side) + u64::from(!plate.file.tile.is_multiple_of(side));
+    let [wide, tall] = fringes.wave.plane.size;
     sample.segments = tiles_x * tiles_y * per_tile(wide) * per_tile(tall);
     Ok(sample)
 }
 
-/// The plan, from a sample.
-pub fn plan(maker: &Maker, sample: &Sample) -> Plan {
-    let plate = maker.plate;
-    let Band { divisor, angle, .. } = maker.band;
-    let pixels = plate.width as f64 * plate.height as f64;
+/// What a plate in a folder will take.
+///
+/// # Errors
+/// [`Error::Parameter`] when no point is seen from anywhere on the plate; those of
+/// [`crate::segments::ObjectWave::field`].
+pub fn plan(fringes: &PlateFringes, folder: &Path, progress: &Progress) -> Result<Plan> {
+    let sample = sample(fringes, progress)?;
+    let (plate, grid) = (&fringes.plate, fringes.wave.plane.grid);
+    let ObjectBand { divisor, angle, .. } = fringes.wave.plane.band;
+    let pixels = plate.raster.width as f64 * plate.raster.height as f64;
     let work = &sample.work;
     // Pairs are those of all samples, their speed that of a whole segment, which is also the last one: caches are warm.
     let whole = &sample.whole;
@@ -180,92 +183,102 @@ pub fn plan(maker: &Maker, sample: &Sample) -> Plan {
     let per_pixel = pairs * share(whole.field_seconds, whole.pairs);
     let points = share(work.points as f64, work.segments as f64);
     let per_segment = points * share(whole.points_seconds, whole.points as f64);
-    let halo = if plate.bits == 1 && plate.binarisation == Binarisation::Diffusion {
-        (1.0 + 48.0 / plate.tile as f64) * (1.0 + 24.0 / plate.tile as f64)
+    let halo = if plate.fringe.bits == 1 && plate.fringe.binarisation == Binarisation::Diffusion {
+        (1.0 + 48.0 / plate.file.tile as f64) * (1.0 + 24.0 / plate.file.tile as f64)
     } else {
         1.0
     };
     let fringe = share(whole.fringe_seconds, whole.pixels as f64);
     let seconds = pixels * halo * (per_pixel + fringe) + per_segment * sample.segments as f64;
     let layout = Layout::new(plate);
-    let side = plate.tile + 48;
+    let side = plate.file.tile + 48;
     let segment = (plate.segment / u64::from(divisor[0])) * (plate.segment / u64::from(divisor[1]));
-    let memory = side * side * 12 + plate.tile * plate.tile * 3 + segment * 8 + sample.most_points * 400 + (64 << 20);
-    let rays = match maker.source {
-        Source::Cloud(_) | Source::ColorCloud(_) => 0,
-        Source::Scene(_) => {
-            (work.points as f64 / work.segments as f64 * sample.segments as f64) as u64 * u64::from(plate.rays).pow(2)
+    let memory =
+        side * side * 12 + plate.file.tile * plate.file.tile * 3 + segment * 8 + sample.most_points * 400 + (64 << 20);
+    let rays = match fringes.wave.object {
+        Object::Points(_) | Object::ColorPoints(_) => 0,
+        Object::Scene(_) => {
+            (work.points as f64 / work.segments as f64 * sample.segments as f64) as u64
+                * u64::from(plate.view.rays).pow(2)
         }
     };
+    let file = file_raster(plate);
     let sine = |pitch: f64| (plate.wavelength / (2.0 * pitch)).min(1.0).asin();
     let mut plan = Plan {
-        size: file_size(plate),
-        extent: plate.extent(),
+        size: [file.width, file.height],
+        extent: [grid.extent_x(), grid.extent_y()],
         tiles: tile_counts(plate),
         segments: sample.segments,
         points: [work.points / work.segments.max(1), sample.most_points],
         rays,
         pairs: pairs * pixels * halo,
         object_angle: angle,
-        diffraction_angle: [sine(plate.pitch_x), sine(plate.pitch_y)],
-        reference: plate.reference.frequencies(plate),
+        diffraction_angle: [sine(plate.raster.pitch_x), sine(plate.raster.pitch_y)],
+        reference_frequencies: plate.reference_frequencies(),
+        slit: plate.slit.clone(),
         amplitude: sample.amplitude,
         seconds,
         seconds_on_100: seconds / 100.0,
         memory,
         disk: layout.length(),
-        files: vec![super::job::PLATE.to_owned(), super::manifest::NAME.to_owned()],
-        resolution: [resolution(plate.pitch_x), resolution(plate.pitch_y)],
+        disk_free: files::free_space(folder),
+        files: vec![super::folder::PLATE.to_owned(), super::manifest::NAME.to_owned()],
+        resolution: [resolution(plate.raster.pitch_x), resolution(plate.raster.pitch_y)],
+        instruction_set: fringes.wave.instruction_set.name(),
         warnings: Vec::new(),
     };
-    plan.warnings = warnings(maker, &plan);
-    plan
+    plan.warnings = warnings(fringes, &plan);
+    Ok(plan)
 }
 
-fn warnings(maker: &Maker, plan: &Plan) -> Vec<String> {
-    let plate = maker.plate;
+fn warnings(fringes: &PlateFringes, plan: &Plan) -> Vec<String> {
+    let plate = &fringes.plate;
+    let object = &fringes.wave.object;
     let mut out = Vec::new();
     let mm = |metres: f64| format!("{:.3} mm", metres * 1e3);
     let degrees = |angle: f64| format!("{:.2} deg", angle.to_degrees());
-    let depths = maker.source.depths();
+    let depths = object.depths();
     for (axis, name) in ["x", "y"].into_iter().enumerate() {
         // From the viewer's place the plate's edge is seen at an angle; what is sent there must reach it.
-        let edge = (0.5 * plan.extent[axis] / plate.viewer).atan();
-        if edge > maker.band.angle[axis] {
-            let seen = 2.0 * plate.viewer * maker.band.angle[axis].tan();
+        let edge = (0.5 * plan.extent[axis] / plate.view.viewer).atan();
+        if edge > fringes.wave.plane.band.angle[axis] {
+            let seen = 2.0 * plate.view.viewer * fringes.wave.plane.band.angle[axis].tan();
             out.push(format!(
                 "along {name} the object's light spreads ±{}, the plate's edge is seen from {} at {}: a viewer there sees {} of the plate",
-                degrees(maker.band.angle[axis]),
-                mm(plate.viewer),
+                degrees(fringes.wave.plane.band.angle[axis]),
+                mm(plate.view.viewer),
                 degrees(edge),
                 mm(seen)
             ));
         }
     }
-    let segment = plate.segment as f64 * plate.pitch_x.max(plate.pitch_y);
+    let segment = plate.segment as f64 * plate.raster.pitch_x.max(plate.raster.pitch_y);
     let nearest = if depths[0] <= 0.0 && depths[1] >= 0.0 { 0.0 } else { depths[0].abs().min(depths[1].abs()) };
-    if nearest < segment && matches!(maker.source, Source::Scene(_)) {
+    if nearest < segment && matches!(object, Object::Scene(_)) {
         out.push(format!(
             "the scene comes within {} of the plate, less than a segment's {}: its occlusion is that of the segment's middle; a smaller segment is truer",
             mm(nearest),
             mm(segment)
         ));
     }
-    if plate.bits == 1 && plate.binarisation == Binarisation::Threshold && plate.reference == Reference::None {
+    if plate.fringe.bits == 1
+        && plate.fringe.binarisation == Binarisation::Threshold
+        && plate.reference == Reference::None
+    {
         out.push("a thresholded fringe without a carrier keeps little but edges; look at a preview".into());
     }
-    if plate.bits == 1 && plate.quantity == Quantity::Phase {
+    if plate.fringe.bits == 1 && plate.fringe.quantity == Quantity::Phase {
         out.push("a phase of two levels has a conjugate image as bright as the object".into());
     }
-    if let Source::Cloud(_) | Source::ColorCloud(_) = maker.source {
+    if !matches!(object, Object::Scene(_)) {
         out.push("points are the same from everywhere: nothing hides anything; give a scene for true views".into());
     }
     if let Some(slit) = &plate.slit {
-        let sine = plan.reference[1][1].abs().max(plan.reference[1][0].abs())
+        let sine = plan.reference_frequencies[1][1].abs().max(plan.reference_frequencies[1][0].abs())
             * plate.wavelengths().iter().copied().fold(f64::INFINITY, f64::min);
         let (apart, lit) = (
-            slit.separation(plate, sine),
-            slit.height + plate.wavelength * plate.viewer / (slit.strip as f64 * plate.pitch_y),
+            slit.separation(plate.view.viewer, sine),
+            slit.height + plate.wavelength * plate.view.viewer / (slit.strip as f64 * plate.raster.pitch_y),
         );
         if apart < lit {
             out.push(format!(
@@ -276,7 +289,10 @@ fn warnings(maker: &Maker, plan: &Plan) -> Vec<String> {
             ));
         }
     }
-    if plate.pitch_x != plate.pitch_y {
+    if let Some(free) = plan.disk_free.filter(|free| *free < plan.disk) {
+        out.push(format!("the disk has {} MB free: the work will stop when it is full", free / 1_000_000));
+    }
+    if plate.raster.pitch_x != plate.raster.pitch_y {
         out.push("pixels are not square; check that the printer's are the same".into());
     }
     out

@@ -9,14 +9,15 @@
 //! pupil, and carried back to the plane in focus.
 
 use super::export::Reader;
-use super::geometry::Rect;
 use super::plate::Plate;
-use super::thinning::{Thinning, USABLE, thin};
+use super::reference::frequency_range;
+use super::thinning::{Carried, Thinning, USABLE, thin};
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Complex64, Fft2, Grid};
 use crate::progress::Progress;
 use crate::propagation::band;
 use crate::reconstruction::Picture;
+use crate::segments::Rect;
 use glam::DVec2;
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -30,8 +31,8 @@ pub struct PreviewSettings {
     pub pupil: f64,
     /// Depth that it focuses on, z [m].
     pub focus: f64,
-    /// Pixels of the picture across and down.
-    pub size: (usize, usize),
+    /// Pixels of the picture across and down; 400 along the longer side where `None`.
+    pub size: Option<(usize, usize)>,
     /// First column and row of the part that is looked at, and its size; the whole plate where `None`.
     pub part: Option<[u64; 4]>,
     /// Wavelength of the lamp [m]; the plate's own where `None`. Another one shows what white light would do.
@@ -45,6 +46,8 @@ pub struct PreviewSettings {
 pub struct Preview {
     /// The picture on the plane in focus: power in each cell for a reference of 1 W/m², row 0 on top.
     pub picture: Picture,
+    /// Depth of that plane, z [m].
+    pub focus: f64,
     /// Its middle (x, y) on that plane [m].
     pub center: [f64; 2],
     /// Its half width and half height [m].
@@ -61,14 +64,10 @@ pub struct Preview {
 
 /// Lowest and highest spatial frequency along an axis of light from one rectangle to another at a distance.
 fn towards(from: [[f64; 2]; 2], to: [[f64; 2]; 2], distance: f64, wavelength: f64, axis: usize) -> [f64; 2] {
-    let other = 1 - axis;
-    let aside = [to[other][0] - from[other][1], to[other][1] - from[other][0]];
-    let nearest = if aside[0] <= 0.0 && aside[1] >= 0.0 { 0.0 } else { aside[0].abs().min(aside[1].abs()) };
-    let farthest = aside[0].abs().max(aside[1].abs());
-    let at = |d: f64, o: f64| d / (d * d + o * o + distance * distance).sqrt() / wavelength;
-    let ends = [to[axis][0] - from[axis][1], to[axis][1] - from[axis][0]];
-    let all = [at(ends[0], nearest), at(ends[0], farthest), at(ends[1], nearest), at(ends[1], farthest)];
-    [all.iter().copied().fold(f64::INFINITY, f64::min), all.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
+    let way = |axis: usize| [to[axis][0] - from[axis][1], to[axis][1] - from[axis][0]];
+    let [low, high] = way(1 - axis);
+    let nearest = if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()) };
+    frequency_range(way(axis), [nearest, low.abs().max(high.abs())], distance, wavelength)
 }
 
 /// Reconstructs what an eye sees of a part of a finished plate.
@@ -97,8 +96,13 @@ pub fn preview(folder: &Path, settings: &PreviewSettings, progress: &Progress) -
     if !(1e-8..1e-4).contains(&wavelength) {
         return Err(Error::parameter("wavelength", format!("{wavelength} m must lie between 10 nm and 100 um")));
     }
-    let part = part_of(&plate, settings.part)?;
-    let (width, height) = settings.size;
+    let (part, grid) = (part_of(&plate, settings.part)?, plate.raster.grid());
+    let (width, height) = settings.size.unwrap_or_else(|| {
+        let sides = DVec2::new(part.width() as f64 * grid.pitch_x, part.height() as f64 * grid.pitch_y);
+        let [width, height] =
+            (400.0 * sides / sides.max_element()).to_array().map(|side| (side.round() as usize).max(1));
+        (width, height)
+    });
     let eye = Eye { plate: &plate, settings, wavelength };
     let mut pieces = 1;
     let cuts = loop {
@@ -123,7 +127,7 @@ pub fn preview(folder: &Path, settings: &PreviewSettings, progress: &Progress) -
                 what: "preview",
                 needed: needed.div_ceil(1 << 20),
                 budget: settings.memory >> 20,
-                hint: "look at a part of the plate (--part), or from farther away".into(),
+                hint: "look at a part of the plate, or from farther away".into(),
             });
         }
         pieces *= 2;
@@ -143,7 +147,16 @@ pub fn preview(folder: &Path, settings: &PreviewSettings, progress: &Progress) -
     }
     let passed = if arriving > 0.0 { passed / arriving } else { 0.0 };
     let dazzled = eye.dazzled(&part);
-    Ok(Preview { picture, center: whole.center, half: whole.half, thinned, transform, passed, dazzled })
+    Ok(Preview {
+        picture,
+        focus: settings.focus,
+        center: whole.center,
+        half: whole.half,
+        thinned,
+        transform,
+        passed,
+        dazzled,
+    })
 }
 
 /// Whoever looks, and at what.
@@ -182,8 +195,10 @@ impl Look {
 
 /// Edges of a rectangle of the plate along x and y [m].
 fn edges(plate: &Plate, rect: &Rect) -> [[f64; 2]; 2] {
-    let (dx, dy) = (0.5 * plate.pitch_x, 0.5 * plate.pitch_y);
-    [[plate.x(rect.x[0]) - dx, plate.x(rect.x[1] - 1) + dx], [plate.y(rect.y[1] - 1) - dy, plate.y(rect.y[0]) + dy]]
+    let grid = plate.raster.grid();
+    let (x, y) = (|column: i64| grid.x(column as usize), |row: i64| grid.y(row as usize));
+    let (dx, dy) = (0.5 * grid.pitch_x, 0.5 * grid.pitch_y);
+    [[x(rect.x[0]) - dx, x(rect.x[1] - 1) + dx], [y(rect.y[1] - 1) - dy, y(rect.y[0]) + dy]]
 }
 
 impl Eye<'_> {
@@ -195,7 +210,7 @@ impl Eye<'_> {
 
     /// Whether some of the lamp's light goes through a part of the plate straight into the pupil.
     fn dazzled(&self, part: &Rect) -> bool {
-        let lamp = self.plate.reference.frequencies_at(self.plate, self.wavelength);
+        let lamp = self.plate.reference.frequencies(&self.plate.raster.grid(), self.wavelength);
         (0..2).all(|axis| {
             let ends = [edges(self.plate, part), self.opening()];
             let [low, high] = towards(ends[0], ends[1], self.settings.eye[2], self.wavelength, axis);
@@ -208,7 +223,7 @@ impl Eye<'_> {
         let (plate, PreviewSettings { pupil, focus, eye: [ex, ey, ez], .. }) = (self.plate, self.settings);
         // Out of focus the plate's light is blurred over the pupil's image on it; and the pupil diffracts: nine tenths of
         // a spot's light lie within two of its rings, the rest falls with the cube of the distance.
-        let pitches = [plate.pitch_x, plate.pitch_y];
+        let pitches = [plate.raster.pitch_x, plate.raster.pitch_y];
         let blur = 0.5 * pupil * focus.abs() / (ez - focus) + 12.0 * self.wavelength * ez / pupil;
         let [across, down] = pitches.map(|pitch| (1.1 * blur / pitch).ceil() as i64);
         let lit = Rect {
@@ -247,17 +262,17 @@ impl Eye<'_> {
         let [pitch_x, pitch_y] = look.pitch;
         let mut grid = Grid::new(look.kept[0], look.kept[1], pitch_x, pitch_y)?;
         // Sample m stands on pixel m·factor of what is lit.
+        let whole = plate.raster.grid();
         grid.center = [
-            plate.x(look.lit.x[0]) + 0.5 * (look.kept[0] as f64 - 1.0) * pitch_x,
-            plate.y(look.lit.y[0]) - 0.5 * (look.kept[1] as f64 - 1.0) * pitch_y,
+            whole.x(look.lit.x[0] as usize) + 0.5 * (look.kept[0] as f64 - 1.0) * pitch_x,
+            whole.y(look.lit.y[0] as usize) - 0.5 * (look.kept[1] as f64 - 1.0) * pitch_y,
         ];
         let thinning = look.factor.map(Thinning::new);
-        let lamp = (self.wavelength, look.carrier);
-        let thinned = thin(reader, plate, &look.lit, thinning, look.kept, lamp, progress)?;
-        let wave = Wave { wavelength: self.wavelength, carrier: look.carrier };
+        let wave = Carried { wavelength: self.wavelength, carrier: look.carrier };
+        let thinned = thin(reader, plate, &look.lit, thinning, look.kept, &wave, progress)?;
         let pupil_grid = Grid::new(look.pupil[0], look.pupil[1], pitch_x, pitch_y)?.centered_at([*ex, *ey]);
         progress.start("to the pupil", 0);
-        let mut at_pupil = wave.carried(thinned, &grid, &pupil_grid, *ez, progress)?;
+        let mut at_pupil = wave.propagate(thinned, &grid, &pupil_grid, *ez, progress)?;
         // Power, so that pieces and colours of other samplings compare.
         let area = pitch_x * pitch_y;
         let energy = |field: &[Complex32]| area * field.iter().map(|u| f64::from(u.norm_sqr())).sum::<f64>();
@@ -271,34 +286,31 @@ impl Eye<'_> {
         let passed = energy(&at_pupil);
         let window = Grid::new(look.window[0], look.window[1], pitch_x, pitch_y)?.centered_at(look.center);
         progress.start("to the focus", 0);
-        let seen = wave.carried(at_pupil, &pupil_grid, &window, focus - ez, progress)?;
+        let seen = wave.propagate(at_pupil, &pupil_grid, &window, focus - ez, progress)?;
         let values: Vec<f32> = seen.iter().map(|u| area as f32 * u.norm_sqr()).collect();
         Ok((Picture::from_samples(&window, &values, look.half, size.0, size.1), [arriving, passed]))
     }
 }
 
 fn part_of(plate: &Plate, part: Option<[u64; 4]>) -> Result<Rect> {
-    let [column, row, width, height] = part.unwrap_or([0, 0, plate.width, plate.height]);
+    let [column, row, width, height] = part.unwrap_or([0, 0, plate.raster.width, plate.raster.height]);
     let fits = |from: u64, size: u64, whole: u64| size > 0 && from.checked_add(size).is_some_and(|end| end <= whole);
-    if !fits(column, width, plate.width) || !fits(row, height, plate.height) {
-        let what = format!("{column},{row},{width}x{height} is not on the plate of {}×{}", plate.width, plate.height);
+    if !fits(column, width, plate.raster.width) || !fits(row, height, plate.raster.height) {
+        let what = format!(
+            "{column},{row},{width}x{height} is not on the plate of {}×{}",
+            plate.raster.width, plate.raster.height
+        );
         return Err(Error::parameter("part", what));
     }
     let span = |from: u64, size: u64| [from as i64, (from + size) as i64];
     Ok(Rect { x: span(column, width), y: span(row, height) })
 }
 
-/// A wave about a carrier.
-struct Wave {
-    wavelength: f64,
-    carrier: [f64; 2],
-}
-
-impl Wave {
-    /// Carries samples, the carrier taken out of them, over a distance onto a window of the same pitch.
+impl Carried {
+    /// Takes samples over a distance onto a window of the same pitch.
     ///
     /// The band-limited angular spectrum of [`crate::propagation`], with each frequency's true one f + f_c.
-    fn carried(
+    fn propagate(
         &self,
         samples: Vec<Complex32>,
         input: &Grid,

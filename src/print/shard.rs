@@ -34,32 +34,25 @@ impl Shard {
         let of = |name: &str| -> Result<Option<u64>> {
             variable(name).map(|v| number(&v).map_err(|_| wrong(format!("{name}=`{v}` is no number")))).transpose()
         };
+        let needed =
+            |name: &str, hint: &str| of(name)?.ok_or_else(|| wrong(format!("auto: {name} is not set; {hint}")));
+        let unset = || wrong("auto: neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set; give i/n".into());
+        let scheduled = || Ok((of("SLURM_ARRAY_TASK_ID")?, of("JOB_COMPLETION_INDEX")?));
         let shard = match text.split_once('/') {
             Some(("auto", count)) => {
-                let index = of("SLURM_ARRAY_TASK_ID")?.or(of("JOB_COMPLETION_INDEX")?);
-                let index = index.ok_or_else(|| {
-                    wrong("auto: neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set; give i/n".into())
-                })?;
-                Self { index, count: number(count)? }
+                let (slurm, kubernetes) = scheduled()?;
+                Self { index: slurm.or(kubernetes).ok_or_else(unset)?, count: number(count)? }
             }
             Some((index, count)) => Self { index: number(index)?, count: number(count)? },
-            None if text == "auto" => {
-                if let Some(id) = of("SLURM_ARRAY_TASK_ID")? {
-                    let (first, step) =
-                        (of("SLURM_ARRAY_TASK_MIN")?.unwrap_or(0), of("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1));
-                    let count = of("SLURM_ARRAY_TASK_COUNT")?
-                        .ok_or_else(|| wrong("auto: SLURM_ARRAY_TASK_COUNT is not set; give auto/n".into()))?;
-                    Self { index: id.saturating_sub(first) / step.max(1), count }
-                } else if let Some(index) = of("JOB_COMPLETION_INDEX")? {
-                    let count = of("JOB_COMPLETIONS")?
-                        .ok_or_else(|| wrong("auto: JOB_COMPLETIONS is not set; set it, or give auto/n".into()))?;
-                    Self { index, count }
-                } else {
-                    return Err(wrong(
-                        "auto: neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set; give i/n".into(),
-                    ));
+            None if text == "auto" => match scheduled()? {
+                (Some(id), _) => {
+                    let (first, step) = (of("SLURM_ARRAY_TASK_MIN")?, of("SLURM_ARRAY_TASK_STEP")?);
+                    let index = id.saturating_sub(first.unwrap_or(0)) / step.unwrap_or(1).max(1);
+                    Self { index, count: needed("SLURM_ARRAY_TASK_COUNT", "give auto/n")? }
                 }
-            }
+                (None, Some(index)) => Self { index, count: needed("JOB_COMPLETIONS", "set it, or give auto/n")? },
+                (None, None) => return Err(unset()),
+            },
             None => return Err(wrong(format!("`{text}` is not i/n such as 0/8, nor auto"))),
         };
         if shard.count == 0 || shard.index >= shard.count {

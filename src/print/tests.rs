@@ -1,20 +1,16 @@
 //! Tiles against analytic waves, neighbours that agree, seams, previews of points, folders that were cut off.
 
-use super::fringe::HALO;
-use super::geometry::{Piece, Rect, fringe_area, pieces, plate_from_file, tile_counts, tile_in_file};
+use super::geometry::{file_raster, fringe_area, plate_from_file, tile_counts, tile_in_file};
 use super::preview::{PreviewSettings, preview};
 use super::*;
 use crate::error::Error;
 use crate::field::{Complex32, Complex64, Fft2};
-use crate::hologram::InstructionSet;
-use crate::illumination::test_rooms::Room;
-use crate::illumination::{Illumination, IlluminationSettings};
 use crate::points::PointSource;
 use crate::progress::Progress;
 use crate::random::Random;
 use crate::reconstruction::Picture;
-use crate::scene::{Camera, Material, SceneBvh};
-use glam::{DVec3, Vec3};
+use crate::segments::{Object, ObjectWave, Piece, Rect};
+use glam::DVec3;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::fs;
@@ -43,20 +39,20 @@ fn cloud(count: u64) -> Vec<PointSource> {
     (0..count).map(at).collect()
 }
 
-pub(super) fn maker<'a>(plate: &'a Plate, source: &'a Source<'a>) -> Maker<'a> {
-    Maker { plate, band: Band::of(plate).expect("band"), source, instruction_set: InstructionSet::detect() }
+pub(super) fn fringes(plate: &Plate, object: Object) -> PlateFringes {
+    PlateFringes { plate: plate.clone(), wave: ObjectWave::new(plate.segments().expect("band"), object) }
 }
 
 /// All levels of a plate as its file shows them.
-pub(super) fn whole(maker: &Maker, amplitude: f32, halo: i64) -> Vec<u8> {
-    let plate = maker.plate;
+pub(super) fn whole(fringes: &PlateFringes, amplitude: f32) -> Vec<u8> {
+    let plate = &fringes.plate;
     let [across, down] = tile_counts(plate);
-    let width = geometry::file_size(plate)[0] as usize;
-    let mut out = vec![0; (plate.width * plate.height) as usize];
+    let width = file_raster(plate).width as usize;
+    let mut out = vec![0; (plate.raster.width * plate.raster.height) as usize];
     for index in 0..across * down {
-        let levels = maker.tile_with(index, amplitude, halo, &Progress::new()).expect("tile").0;
+        let levels = fringes.tile(index, amplitude, &Progress::new()).expect("tile").0;
         let rect = tile_in_file(plate, index);
-        for (row, line) in (rect.y[0]..rect.y[1]).zip(levels.chunks_exact(plate.tile as usize)) {
+        for (row, line) in (rect.y[0]..rect.y[1]).zip(levels.chunks_exact(plate.file.tile as usize)) {
             let at = row as usize * width + rect.x[0] as usize;
             out[at..at + rect.width()].copy_from_slice(&line[..rect.width()]);
         }
@@ -67,25 +63,27 @@ pub(super) fn whole(maker: &Maker, amplitude: f32, halo: i64) -> Vec<u8> {
 #[test]
 fn the_field_is_the_spherical_wave_within_the_objects_cone_and_dark_beyond() {
     let plate = plate("[640, 384]", "bits = 8\ntile = 128\nsegment = 96", "angle = [\"9deg\", \"0deg\"]");
-    let source = Source::Cloud(vec![point(200e-6, -150e-6, -2e-3)]);
-    let maker = maker(&plate, &source);
-    assert_eq!(maker.band.divisor, [2, 1], "the carrier takes half of x and nothing of y");
+    let source = Object::Points(vec![point(200e-6, -150e-6, -2e-3)]);
+    let fringes = fringes(&plate, source);
+    assert_eq!(fringes.wave.plane.band.divisor, [2, 1], "the carrier takes half of x and nothing of y");
     // An odd rectangle, cut by segments.
     let rect = Rect { x: [1, 640], y: [77, 384] };
-    let (field, work) = maker.field(&rect, &pieces(&plate, &rect, &rect), &Progress::new()).expect("field");
+    let (field, work) =
+        fringes.wave.field(&rect, &fringes.wave.plane.pieces(&rect, &rect), &Progress::new()).expect("field");
     let (mut bright, mut dark, mut brightest) = (0, 0, 0.0f64);
     for (i, u) in field.iter().enumerate() {
         let (column, row) = (rect.x[0] + (i % rect.width()) as i64, rect.y[0] + (i / rect.width()) as i64);
-        let (dx, dy) = (plate.x(column) - 200e-6, plate.y(row) + 150e-6);
+        let grid = &fringes.wave.plane.grid;
+        let (dx, dy) = (grid.x(column as usize) - 200e-6, grid.y(row as usize) + 150e-6);
         let r = (dx * dx + dy * dy + 2e-3f64.powi(2)).sqrt();
         let wave = Complex64::from_polar(1e-3 / r, TAU * (r / 633e-9).fract() + 0.7);
         let f = [dx, dy].map(|d| (d / (r * 633e-9)).abs());
         // The taper is flat to 0.7 of the band; its edge is blurred by some Fresnel widths of these 2 mm.
-        if f[0] < 0.5 * maker.band.half[0] && f[1] < 0.5 * maker.band.half[1] {
+        if f[0] < 0.5 * fringes.wave.plane.band.half[0] && f[1] < 0.5 * fringes.wave.plane.band.half[1] {
             let difference = (Complex64::new(u.re.into(), u.im.into()) - wave).norm() / wave.norm();
             assert!(difference < 3e-2, "column {column}, row {row}: {u} is not {wave}");
             bright += 1;
-        } else if f[0] > 1.3 * maker.band.half[0] {
+        } else if f[0] > 1.3 * fringes.wave.plane.band.half[0] {
             brightest = brightest.max(u.norm().into());
             dark += 1;
         }
@@ -98,10 +96,10 @@ fn the_field_is_the_spherical_wave_within_the_objects_cone_and_dark_beyond() {
 
 #[test]
 fn any_cut_into_tiles_and_any_turn_of_the_file_shows_the_same_fringes() {
-    let source = Source::Cloud(cloud(12));
+    let source = || Object::Points(cloud(12));
     let reference = "angle = [\"9deg\", \"0deg\"]";
     let first = plate("[320, 192]", "bits = 8\ntile = 64", reference);
-    let levels = whole(&maker(&first, &source), 4.0, HALO);
+    let levels = whole(&fringes(&first, source()), 4.0);
     assert!(levels.iter().any(|&l| l > 150) && levels.iter().any(|&l| l < 100), "no fringes");
     for (more, mirror, turned) in [
         ("tile = 128\nsegment = 100", false, 0),
@@ -110,13 +108,13 @@ fn any_cut_into_tiles_and_any_turn_of_the_file_shows_the_same_fringes() {
         ("tile = 64\nmirror = true\nrotation = 270\npolarity = \"negative\"", true, 270),
     ] {
         let other = plate("[320, 192]", &format!("bits = 8\n{more}"), reference);
-        assert_eq!((other.mirror, other.rotation), (mirror, turned));
-        let file = whole(&maker(&other, &source), 4.0, HALO);
-        let width = geometry::file_size(&other)[0] as usize;
+        assert_eq!((other.file.mirror, other.file.rotation), (mirror, turned));
+        let file = whole(&fringes(&other, source()), 4.0);
+        let width = file_raster(&other).width as usize;
         let mut worst = 0;
         for (i, &level) in file.iter().enumerate() {
             let [x, y] = plate_from_file(&other, [(i % width) as i64, (i / width) as i64]);
-            let level = if other.polarity == Polarity::Negative { 255 - level } else { level };
+            let level = if other.fringe.polarity == Polarity::Negative { 255 - level } else { level };
             worst = worst.max(level.abs_diff(levels[y as usize * 320 + x as usize]));
         }
         // Other tiles are other tables of the same wave, to the plate's error of half a per cent of some fringes.
@@ -126,7 +124,9 @@ fn any_cut_into_tiles_and_any_turn_of_the_file_shows_the_same_fringes() {
 
 #[test]
 fn references_that_do_not_fit_are_refused_with_numbers() {
-    let band = |more: &str, reference: &str| Band::of(&plate("[640, 384]", &format!("tile = 128\n{more}"), reference));
+    let band = |more: &str, reference: &str| {
+        plate("[640, 384]", &format!("tile = 128\n{more}"), reference).segments().map(|plane| plane.band)
+    };
     // Half of the limit of 18.45 deg for the carrier, half for the object.
     let half = band("bits = 8", "angle = [\"9.1deg\", \"0deg\"]").expect("band");
     assert_eq!(half.divisor, [2, 1]);
@@ -147,85 +147,13 @@ fn references_that_do_not_fit_are_refused_with_numbers() {
     // The wave of a far lamp is a plane wave.
     let lamp = plate("[640, 384]", "bits = 8\ntile = 128", "point = [\"-158m\", \"0mm\", \"-1000m\"]");
     let angle = 0.158f64.atan();
-    let [[low, high], _] = lamp.reference.frequencies(&lamp);
+    let [[low, high], _] = lamp.reference_frequencies();
     assert!((low - angle.sin() / 633e-9).abs() < 2.0 && (high - low).abs() < 2.0, "{low} {high}");
     let mut row = Vec::new();
-    lamp.reference.row(&lamp, lamp.wavelength, 10, 100..130, &mut row);
+    lamp.reference.row(&lamp.raster.grid(), lamp.wavelength, 10, 100..130, &mut row);
     let step = |i: usize| (row[i + 1] * row[i].conj()).arg();
     let expected = Complex64::cis(TAU * angle.sin() * 1e-6 / 633e-9).arg() as f32;
     assert!((step(0) - expected).abs() < 2e-3 && (step(28) - expected).abs() < 2e-3, "{} {expected}", step(0));
-}
-
-/// A scene: a lamp that fills the view of the plate, 2 mm behind it, and before its middle a black strip.
-fn strip() -> Room {
-    let mut room = Room::default();
-    let lamp = room.material(Material::emitter(Vec3::ONE));
-    let black = room.material(Material { double_sided: true, ..Material::diffuse(Vec3::ZERO) });
-    room.quad(DVec3::new(-1.0, -1.0, -0.5), DVec3::X * 2.0, DVec3::Y * 2.0, lamp);
-    room.quad(DVec3::new(-0.1, -1.0, 0.5), DVec3::X * 0.2, DVec3::Y * 2.0, black);
-    room
-}
-
-#[test]
-fn segments_see_truly_and_neighbours_send_the_same_points() {
-    let room = strip();
-    let bvh = SceneBvh::new(room.scene.clone());
-    let light = Illumination::new(bvh, IlluminationSettings::default(), &Progress::new()).expect("light");
-    let camera = Camera::looking_at(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, 0.7);
-    let mut plate = plate("[640, 384]", "bits = 8\ntile = 128\nsegment = 64", "angle = [\"9.1deg\", \"0deg\"]");
-    // A millimetre a metre: the lamp is 2 mm wide at z = −2.5 mm, the strip stands at z = −1.5 mm.
-    plate.scale = Some(1e-3);
-    let views = Views::new(&light, &room.scene, &camera, &plate, None, 8, &Progress::new()).expect("views");
-    assert!((views.depths()[0] + 2.5e-3).abs() < 1e-9 && (views.depths()[1] + 1.5e-3).abs() < 1e-9);
-    let source = Source::Scene(Box::new(views));
-    let band = Band::of(&plate).expect("band");
-    let see = |segment: [i64; 2]| source.points(&plate, &band, segment, &Progress::new()).expect("points");
-    let (left, right, far) = (see([3, 2]), see([4, 2]), see([6, 2]));
-    // What one segment sends, the next sends from the same places in the same phases.
-    let key = |p: &PointSource| p.position.to_array().map(f64::to_bits);
-    let shared = |a: &[PointSource], b: &[PointSource]| {
-        let known: BTreeMap<_, u64> = b.iter().map(|p| (key(p), p.phase.to_bits())).collect();
-        a.iter().filter(|p| known.get(&key(p)) == Some(&p.phase.to_bits())).count() as f64 / a.len() as f64
-    };
-    assert!(shared(&left, &right) > 0.75, "{} of {} are shared", shared(&left, &right), left.len());
-    // The strip hides the lamp between x′ and x″: seen from (x, 0) through ±0.1 mm at 1.5 mm, on 2.5 mm.
-    for (segment, points) in [([3, 2], &left), ([6, 2], &far)] {
-        let [x, _] = geometry::segment_center(&plate, segment);
-        let shadow = |edge: f64| x + (edge - x) / 1.5 * 2.5;
-        let (low, high) = (shadow(-0.1e-3), shadow(0.1e-3));
-        // A segment's rays differ by its own width, a cell by its own.
-        let rim = 64e-6 + 6e-6;
-        let hidden =
-            points.iter().filter(|p| p.position.z < -2.4e-3 && p.position.x > low + rim && p.position.x < high - rim);
-        assert_eq!(hidden.count(), 0, "{segment:?}: light from behind the strip, {low} to {high}");
-        let beside = |from: f64| points.iter().filter(|p| p.position.x > from && p.position.x < from + 50e-6).count();
-        assert!(beside(low - 50e-6 - rim) > 100 && beside(high + rim) > 100, "{segment:?}");
-    }
-    // Irradiance of what is seen, Σ a²/r², is that of a lamp of radiance 1: its solid angle less the strip's.
-    let sum: f64 = far
-        .iter()
-        .map(|p| {
-            let [x, y] = geometry::segment_center(&plate, [6, 2]);
-            f64::from(p.amplitude).powi(2) / (p.position - DVec3::new(x, y, 0.0)).length_squared()
-        })
-        .sum();
-    let [x, _] = geometry::segment_center(&plate, [6, 2]);
-    let solid = |z: f64, x: [f64; 2], y: [f64; 2]| {
-        let corner = |x: f64, y: f64| (x * y / (z * (x * x + y * y + z * z).sqrt())).atan();
-        corner(x[1], y[1]) - corner(x[0], y[1]) - corner(x[1], y[0]) + corner(x[0], y[0])
-    };
-    // The pyramid: apex δ/tan θ beyond, ±θ; lamp to ±1 mm.
-    let tangent = band.angle.map(f64::tan);
-    let half = [0.5 * 64e-6, 0.5 * 80e-6];
-    let beyond = (half[0] / tangent[0]).min(half[1] / tangent[1]);
-    let (wide, tall) = (tangent[0].max(half[0] / beyond), tangent[1].max(half[1] / beyond));
-    let reach = |z: f64, t: f64| (z + beyond) * t;
-    let seen = [(x - reach(2.5e-3, wide)).max(-1e-3) - x, (x + reach(2.5e-3, wide)).min(1e-3) - x];
-    let expected = solid(2.5e-3 + beyond, seen, [-reach(2.5e-3, tall), reach(2.5e-3, tall)]);
-    let near = [-0.1e-3 - x, 0.1e-3 - x].map(|v| v.clamp(-reach(1.5e-3, wide), reach(1.5e-3, wide)));
-    let hidden = solid(1.5e-3 + beyond, near, [-reach(1.5e-3, tall), reach(1.5e-3, tall)]);
-    let ratio = sum / (expected - hidden) / ((2.5e-3 + beyond) / 2.5e-3f64).powi(2);
-    assert!((ratio - 1.0).abs() < 0.05, "{sum} is {ratio} of {expected} less {hidden}");
 }
 
 /// Low-frequency energy of the rounding error on the lattice of tiles, over that of its neighbours in the spectrum.
@@ -251,12 +179,13 @@ fn tiles_leave_no_lattice_in_the_spectrum() {
     let side = 512;
     let lines = "bits = 1\ntile = 64";
     let plate = plate("[512, 512]", lines, "angle = [\"9deg\", \"0deg\"]");
-    let source = Source::Cloud(cloud(16));
-    let maker = maker(&plate, &source);
+    let source = Object::Points(cloud(16));
+    let fringes = fringes(&plate, source);
     let area = fringe_area(&plate);
-    let (field, _) = maker.field(&area, &[Piece { segment: [0, 0], rect: area }], &Progress::new()).expect("field");
-    let wishes = maker.fringe(&field, &area, 6.0);
-    let bits = whole(&maker, 6.0, HALO);
+    let (field, _) =
+        fringes.wave.field(&area, &[Piece { segment: [0, 0], rect: area }], &Progress::new()).expect("field");
+    let wishes = fringes.fringe(&field, &area, 6.0);
+    let bits = whole(&fringes, 6.0);
     // A fault that the test must see: the first column of each tile is darker by a tenth.
     let seams = |fault: f32| {
         let first = |i: usize| if i.is_multiple_of(64) { fault * wishes[i] } else { 0.0 };
@@ -270,13 +199,16 @@ fn tiles_leave_no_lattice_in_the_spectrum() {
     assert!(faulty > 5.0, "the test does not see seams: {faulty}");
 }
 
+pub(super) fn settings(plate: &Plate) -> Settings {
+    Settings { program: "t".into(), plate: plate.clone(), inputs: Vec::new(), options: BTreeMap::new() }
+}
+
 pub(super) fn folder_of(plate: &Plate, points: Vec<PointSource>, folder: &Path, amplitude: f32) -> Manifest {
-    let source = Source::Cloud(points);
-    let maker = maker(plate, &source);
-    let settings = Settings::new(plate, Vec::new(), BTreeMap::new());
+    let fringes = fringes(plate, Object::Points(points));
+    let settings = settings(plate);
     let manifest = Manifest { settings, instruction_set: "x".into(), amplitude, white: 0.0, tiles: None };
-    let manifest = job::begin(folder, &manifest).expect("manifest");
-    let done = job::compute(folder, &maker, &manifest, Shard::default(), &Progress::new()).expect("plate");
+    let manifest = folder::begin(folder, &manifest).expect("manifest");
+    let done = folder::compute(folder, &fringes, &manifest, Shard::default(), &Progress::new()).expect("plate");
     assert!(done.complete);
     manifest
 }
@@ -316,7 +248,7 @@ fn previews_show_points_where_they_are_from_every_eye_and_file() {
                     eye,
                     pupil: 0.9e-3,
                     focus,
-                    size: (192, 144),
+                    size: Some((192, 144)),
                     part: None,
                     wavelength: None,
                     memory: 1 << 30,
@@ -335,14 +267,14 @@ fn previews_show_points_where_they_are_from_every_eye_and_file() {
             eye: [0.0, 0.0, 20e-3],
             pupil: 0.9e-3,
             focus: 0.0,
-            size: (8, 8),
+            size: Some((8, 8)),
             part: Some([0, 0, 769, 4]),
             wavelength: None,
             memory: 1 << 30,
         };
         assert!(preview(&path, &wrong, &Progress::new()).unwrap_err().to_string().contains("not on the plate"));
         // In pieces, because the memory does not hold one transform: the same picture.
-        let once = PreviewSettings { part: None, size: (120, 90), ..wrong.clone() };
+        let once = PreviewSettings { part: None, size: Some((120, 90)), ..wrong.clone() };
         let whole = preview(&path, &once, &Progress::new()).expect("preview");
         let area = |seen: &preview::Preview| (seen.transform[0] * seen.transform[1]) as u64;
         // The pupil takes most of these transforms; a piece saves a fifth.
@@ -363,16 +295,16 @@ fn torn_tiles_are_found_and_redone_and_other_plates_refused() {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path();
     let plate = plate("[320, 192]", "bits = 1\ntile = 64", "angle = [\"9deg\", \"0deg\"]");
-    let source = Source::Cloud(cloud(5));
-    let maker = maker(&plate, &source);
-    let settings = Settings::new(&plate, Vec::new(), BTreeMap::new());
+    let source = Object::Points(cloud(5));
+    let fringes = fringes(&plate, source);
+    let settings = settings(&plate);
     let manifest =
         Manifest { settings: settings.clone(), instruction_set: "x".into(), amplitude: 4.0, white: 0.0, tiles: None };
-    let manifest = job::begin(path, &manifest).expect("manifest");
-    let compute = |shard| job::compute(path, &maker, &manifest, shard, &Progress::new()).expect("tiles");
+    let manifest = folder::begin(path, &manifest).expect("manifest");
+    let compute = |shard| folder::compute(path, &fringes, &manifest, shard, &Progress::new()).expect("tiles");
     let part = compute(Shard { index: 1, count: 3 });
     assert!((part.computed, part.kept, part.finished, part.complete) == (5, 0, 5, false), "{part:?}");
-    let unfinished = job::verify(path, &Progress::new()).unwrap_err().to_string();
+    let unfinished = folder::verify(path, &Progress::new()).unwrap_err().to_string();
     assert!(unfinished.contains("5 of 15"), "{unfinished}");
     // A power cut: half of a tile, and half of a list's last line.
     let partial = path.join(".plate.tif.partial");
@@ -387,7 +319,7 @@ fn torn_tiles_are_found_and_redone_and_other_plates_refused() {
     compute(Shard { index: 2, count: 3 });
     let last = compute(Shard { index: 0, count: 3 });
     assert!(last.complete && last.finished == 15);
-    let verified = job::verify(path, &Progress::new()).expect("verified");
+    let verified = folder::verify(path, &Progress::new()).expect("verified");
     assert_eq!(verified.tiles, 15);
     let bytes = fs::read(path.join("plate.tif")).expect("plate");
     let mut names: Vec<_> = fs::read_dir(path).expect("list").map(|e| e.expect("entry").file_name()).collect();
@@ -397,14 +329,17 @@ fn torn_tiles_are_found_and_redone_and_other_plates_refused() {
     let file = fs::OpenOptions::new().write(true).open(path.join("plate.tif")).expect("file");
     let at = layout.offset(9) + 77;
     tiff::write_at(&file, path, at, &[!bytes[at as usize]]).expect("bit");
-    assert!(job::verify(path, &Progress::new()).unwrap_err().to_string().contains("tile 9"));
+    assert!(folder::verify(path, &Progress::new()).unwrap_err().to_string().contains("tile 9"));
     let complete = Manifest::of(path).expect("manifest");
-    let repaired = job::compute(path, &maker, &complete, Shard::default(), &Progress::new()).expect("repaired");
+    let repaired = folder::compute(path, &fringes, &complete, Shard::default(), &Progress::new()).expect("repaired");
     assert_eq!((repaired.torn, repaired.computed, repaired.complete), (1, 1, true));
     assert_eq!(fs::read(path.join("plate.tif")).expect("plate"), bytes);
     // Another plate in the same folder.
-    let other = Settings { plate: Plate { bias: 0.4, ..plate.clone() }, ..settings.clone() };
-    let refused = job::look(path, &other).unwrap_err().to_string();
-    assert!(refused.contains("plate.bias is 0.5 there, 0.4 here"), "{refused}");
-    assert!(job::look(path, &settings).expect("the same").is_some());
+    let other = Settings {
+        plate: Plate { fringe: FringeSettings { bias: 0.4, ..plate.fringe }, ..plate.clone() },
+        ..settings.clone()
+    };
+    let refused = folder::look(path, &other).unwrap_err().to_string();
+    assert!(refused.contains("plate.fringe.bias is 0.5 there, 0.4 here"), "{refused}");
+    assert!(folder::look(path, &settings).expect("the same").is_some());
 }

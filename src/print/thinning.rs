@@ -1,11 +1,12 @@
 //! The fringes of a finished plate in the light of the reference, limited to a band and thinned out.
 
 use super::export::Reader;
-use super::geometry::{Rect, plate_from_file, tile_in_file, tile_on_plate};
+use super::geometry::{plate_from_file, tile_in_file, tile_on_plate};
 use super::plate::{Plate, Polarity, Quantity};
 use crate::error::Result;
 use crate::field::{Complex32, Complex64};
 use crate::progress::Progress;
+use crate::segments::Rect;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
@@ -13,6 +14,14 @@ use std::f64::consts::{PI, TAU};
 const TAPS: usize = 8;
 /// Share of the kept band that the filter passes evenly and free of aliases.
 pub(super) const USABLE: f64 = 0.66;
+
+/// Light about a spatial frequency, which is taken out of it.
+pub(super) struct Carried {
+    /// Wavelength [m].
+    pub(super) wavelength: f64,
+    /// The frequency [cycles/m].
+    pub(super) carrier: [f64; 2],
+}
 
 /// Thinning along one axis: samples `factor` apart, limited to their band.
 pub(super) struct Thinning {
@@ -57,16 +66,17 @@ pub(super) fn thin(
     part: &Rect,
     [across, down]: [Thinning; 2],
     kept: [usize; 2],
-    (wavelength, carrier): (f64, [f64; 2]),
+    lamp: &Carried,
     progress: &Progress,
 ) -> Result<Vec<Complex32>> {
+    let Carried { wavelength, carrier } = *lamp;
     let mut out = vec![Complex32::default(); kept[0] * kept[1]];
-    let highest = if plate.bits == 1 { 1.0 } else { 255.0f32 };
+    let highest = if plate.fringe.bits == 1 { 1.0 } else { 255.0f32 };
     let phasors: Vec<Complex32> = (0..=highest as usize)
         .map(|level| {
             let level = level as f32 / highest;
-            let t = if plate.polarity == Polarity::Negative { 1.0 - level } else { level };
-            match plate.quantity {
+            let t = if plate.fringe.polarity == Polarity::Negative { 1.0 - level } else { level };
+            match plate.fringe.quantity {
                 Quantity::Phase => {
                     let wave = Complex64::cis(TAU * (f64::from(t) - 0.5));
                     Complex32::new(wave.re as f32, wave.im as f32)
@@ -78,6 +88,7 @@ pub(super) fn thin(
     let tiles: Vec<u64> =
         (0..reader.tiles()).filter(|&index| tile_on_plate(plate, index).and(part).area() > 0).collect();
     progress.start("light on the fringes", tiles.len() as u64);
+    let grid = plate.raster.grid();
     let turned = |turns: f64| {
         let wave = Complex64::cis(TAU * (turns - turns.floor()));
         Complex32::new(wave.re as f32, wave.im as f32)
@@ -92,8 +103,8 @@ pub(super) fn thin(
         for row in file.y[0]..file.y[1] {
             for column in file.x[0]..file.x[1] {
                 let [x, y] = plate_from_file(plate, [column, row]);
-                if (rect.x[0]..rect.x[1]).contains(&x) && (rect.y[0]..rect.y[1]).contains(&y) {
-                    let at = (row - file.y[0]) as usize * plate.tile as usize + (column - file.x[0]) as usize;
+                if rect.contains([x, y]) {
+                    let at = (row - file.y[0]) as usize * plate.file.tile as usize + (column - file.x[0]) as usize;
                     own[(y - rect.y[0]) as usize * rect.width() + (x - rect.x[0]) as usize] = levels[at];
                 }
             }
@@ -101,15 +112,15 @@ pub(super) fn thin(
         let inner = |range: [i64; 2], from: i64| [range[0] - from, range[1] - from];
         let columns = across.touched(inner(rect.x, part.x[0]), kept[0]);
         let rows = down.touched(inner(rect.y, part.y[0]), kept[1]);
-        let along: Vec<Complex32> = (rect.x[0]..rect.x[1]).map(|c| turned(-carrier[0] * plate.x(c))).collect();
+        let along: Vec<Complex32> = (rect.x[0]..rect.x[1]).map(|c| turned(-carrier[0] * grid.x(c as usize))).collect();
         let width = columns.len();
         let mut lines = vec![Complex32::default(); rect.height() * width];
         lines.par_chunks_mut(width.max(1)).zip(own.par_chunks(rect.width())).enumerate().for_each_init(
             || (Vec::new(), Vec::new()),
             |(reference, lit), (i, (line, levels))| {
                 let row = rect.y[0] + i as i64;
-                plate.reference.row(plate, wavelength, row, rect.x[0]..rect.x[1], reference);
-                let turn = turned(-carrier[1] * plate.y(row));
+                plate.reference.row(&grid, wavelength, row, rect.x[0]..rect.x[1], reference);
+                let turn = turned(-carrier[1] * grid.y(row as usize));
                 lit.clear();
                 lit.extend(
                     levels

@@ -4,8 +4,8 @@
 //! finished file is the same. Tiles begin on multiples of [`ALIGN`] bytes, so that no two of them share a page of a network
 //! file system. TIFF 6.0; BigTIFF as Adobe and libtiff have it (magic 43, offsets of eight bytes).
 
-use super::geometry::{file_size, tile_counts};
-use super::plate::Plate;
+use super::geometry::{file_raster, tile_counts};
+use super::plate::{Plate, Raster};
 use crate::error::{Error, Result};
 use crate::units::show_length;
 use std::fs::File;
@@ -58,20 +58,15 @@ pub(super) fn resolution(pitch: f64) -> [u32; 2] {
 impl Layout {
     /// The layout of a plate's file.
     pub(super) fn new(plate: &Plate) -> Self {
-        let [width, height] = file_size(plate);
+        let Raster { width, height, pitch_x, pitch_y } = file_raster(plate);
         let counts = tile_counts(plate);
         let tiles = counts[0] * counts[1];
-        let tile_bytes = plate.tile * plate.tile * u64::from(plate.bits) / 8;
+        let tile_bytes = plate.file.tile * plate.file.tile * u64::from(plate.fringe.bits) / 8;
         let stride = tile_bytes.next_multiple_of(ALIGN);
-        let [pitch_x, pitch_y] = if plate.rotation.is_multiple_of(180) {
-            [plate.pitch_x, plate.pitch_y]
-        } else {
-            [plate.pitch_y, plate.pitch_x]
-        };
         let what = format!(
             "holodrive plate {}: {}-bit fringes, pitch {} x {}, wavelength {}; white is the highest level",
             plate.name,
-            plate.bits,
+            plate.fringe.bits,
             show_length(pitch_x),
             show_length(pitch_y),
             show_length(plate.wavelength)
@@ -93,7 +88,7 @@ impl Layout {
             let tags = vec![
                 (256u16, long(width)),
                 (257, long(height)),
-                (258, short(u16::from(plate.bits))),
+                (258, short(u16::from(plate.fringe.bits))),
                 (259, short(1)),
                 // Black is zero.
                 (262, short(1)),
@@ -104,8 +99,8 @@ impl Layout {
                 // Pixels a centimetre.
                 (296, short(3)),
                 (305, text(concat!("holodrive ", env!("CARGO_PKG_VERSION")))),
-                (322, long(plate.tile)),
-                (323, long(plate.tile)),
+                (322, long(plate.file.tile)),
+                (323, long(plate.file.tile)),
                 (324, list(&|i| first + i * stride)),
                 (325, list(&|_| tile_bytes)),
                 (339, short(1)),

@@ -5,6 +5,8 @@
 //! that counts the padding bits, then eight pixels a byte, the first one high.
 
 use super::export::{Exported, Reader};
+use super::plate::Raster;
+use super::tiff::packed;
 use crate::error::Result;
 use crate::files;
 use crate::progress::Progress;
@@ -16,12 +18,15 @@ const CHUNK: u64 = 512;
 
 pub(super) fn write(reader: &mut Reader, output: &Path, progress: &Progress) -> Result<Exported> {
     let plate = reader.plate().clone();
-    let [width, height] = reader.size();
-    let across = width.div_ceil(plate.tile);
+    let Raster { width, height, .. } = reader.raster();
+    let across = width.div_ceil(plate.file.tile);
     // A multiple of eight that divides the tile; tiles are multiples of 64.
-    let chunk =
-        (1..=CHUNK.min(plate.tile) / 8).map(|n| 8 * n).filter(|n| plate.tile.is_multiple_of(*n)).max().unwrap_or(64);
-    let inner = if plate.bits == 1 {
+    let chunk = (1..=CHUNK.min(plate.file.tile) / 8)
+        .map(|n| 8 * n)
+        .filter(|n| plate.file.tile.is_multiple_of(*n))
+        .max()
+        .unwrap_or(64);
+    let inner = if plate.fringe.bits == 1 {
         json!([{"name": "numcodecs.packbits", "configuration": {}}, {"name": "bytes"}])
     } else {
         json!([{"name": "bytes"}])
@@ -30,10 +35,10 @@ pub(super) fn write(reader: &mut Reader, output: &Path, progress: &Progress) -> 
         "zarr_format": 3,
         "node_type": "array",
         "shape": [height, width],
-        "data_type": if plate.bits == 1 { "bool" } else { "uint8" },
-        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [plate.tile, plate.tile]}},
+        "data_type": if plate.fringe.bits == 1 { "bool" } else { "uint8" },
+        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [plate.file.tile, plate.file.tile]}},
         "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
-        "fill_value": if plate.bits == 1 { json!(false) } else { json!(0) },
+        "fill_value": if plate.fringe.bits == 1 { json!(false) } else { json!(0) },
         "codecs": [{"name": "sharding_indexed", "configuration": {
             "chunk_shape": [chunk, chunk],
             "codecs": inner,
@@ -43,7 +48,7 @@ pub(super) fn write(reader: &mut Reader, output: &Path, progress: &Progress) -> 
         "dimension_names": ["y", "x"],
         "attributes": {
             "plate": plate.name,
-            "pitch": [plate.pitch_x, plate.pitch_y],
+            "pitch": [plate.raster.pitch_x, plate.raster.pitch_y],
             "wavelength": plate.wavelength,
             "rows": "row 0 on top",
         },
@@ -53,7 +58,7 @@ pub(super) fn write(reader: &mut Reader, output: &Path, progress: &Progress) -> 
     for index in 0..reader.tiles() {
         progress.check()?;
         let levels = reader.tile(index)?;
-        let bytes = shard(&levels, plate.tile as usize, chunk as usize, plate.bits);
+        let bytes = shard(&levels, plate.file.tile as usize, chunk as usize, plate.fringe.bits);
         let folder = output.join("c").join((index / across).to_string());
         if index % across == 0 {
             files::output_folder(&folder)?;
@@ -79,12 +84,8 @@ fn shard(levels: &[u8], side: usize, chunk: usize, bits: u8) -> Vec<u8> {
             let rows = (top..top + chunk).map(|row| &levels[row * side + left..row * side + left + chunk]);
             if bits == 1 {
                 out.push(0);
-                for row in rows {
-                    out.extend(row.chunks_exact(8).map(|e| e.iter().fold(0, |byte, &l| byte << 1 | l)));
-                }
-            } else {
-                rows.for_each(|row| out.extend_from_slice(row));
             }
+            rows.for_each(|row| out.extend(packed(row, bits)));
             places.extend((start as u64).to_le_bytes());
             places.extend(((out.len() - start) as u64).to_le_bytes());
         }

@@ -27,7 +27,7 @@ pub(crate) use panel::{ColorArgs, PanelArgs};
 pub(crate) use parse::Ahead;
 pub(crate) use parse::{Wavelengths, White};
 pub(crate) use placement::{PlacementArg, PlacementArgs};
-pub(crate) use print::{ExportArgs, ExportFormat, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs};
+pub(crate) use print::{ExportArgs, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs};
 pub(crate) use scene::{FileArgs, SceneArgs};
 pub(crate) use serve::{ServeArgs, ServedLevelsArg};
 pub(crate) use show::ShowArgs;

@@ -1,8 +1,9 @@
 //! Flags of plates.
 
-use super::parse::{White, part, position, size, white};
+use super::parse::{White, one_of, part, position, size, white};
 use super::scene::FileArgs;
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
+use holodrive::print::export::Format;
 use holodrive::units;
 use std::path::PathBuf;
 
@@ -106,25 +107,13 @@ pub(crate) struct PreviewArgs {
     pub(crate) memory: u64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum ExportFormat {
-    /// Zarr version 3: a shard a tile, one bit packed.
-    Zarr,
-    /// PNG frames.
-    Png,
-    /// BMP frames.
-    Bmp,
-    /// GDSII rectangles, for small masks.
-    Gds,
-}
-
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
     /// The plate's folder.
     pub(crate) folder: PathBuf,
     /// Format.
-    #[arg(long = "as", value_enum, value_name = "FORMAT")]
-    pub(crate) format: ExportFormat,
+    #[arg(long = "as", value_parser = one_of::<Format>(), value_name = "FORMAT")]
+    pub(crate) format: Format,
     /// The folder to write, or the file for gds.
     #[arg(short, long, value_name = "PATH")]
     pub(crate) output: PathBuf,

@@ -1,19 +1,19 @@
 //! `compute --views`: the field of a scene that each segment of the panel sees from its own place.
 
-use super::args::{ComputeArgs, PlacementArg};
+use super::args::{ComputeArgs, PlacementArg, PlacementArgs};
 use super::load::Input;
-use super::print::task;
+use super::print::scene_options;
 use super::report::{Report, count, seconds};
 use holodrive::field::npy;
-use holodrive::hologram::InstructionSet;
 use holodrive::panel::Setup;
-use holodrive::print::PanelViews;
 use holodrive::progress::Progress;
+use holodrive::segments::{Object, ObjectWave, Segments, Viewing};
 use holodrive::{Error, Result};
 
 pub(super) fn compute(
     args: &ComputeArgs,
-    (source, segment): (&Input, u64),
+    source: &Input,
+    segment: u64,
     panel: &Setup,
     progress: &Progress,
     report: &mut Report,
@@ -26,19 +26,18 @@ pub(super) fn compute(
     if panel.lasers.is_some() {
         return refused("are computed in one wavelength at a time; leave --wavelengths out");
     }
-    let views = PanelViews {
-        grid: panel.grid,
-        wavelength: panel.wavelength,
-        viewer: args.placement.viewer,
-        place: args.placement.distance,
-        scale: args.placement.scale,
-        segment,
+    let PlacementArgs { viewer, distance, scale, .. } = args.placement;
+    let plane = Segments {
+        view: Viewing { viewer, place: distance, scale, ..Viewing::default() },
         error: args.hologram.error,
         seed: args.light.random.seed,
+        ..Segments::of_panel(panel.grid, panel.wavelength, segment)?
     };
-    let light = (&args.light.file, args.light.bounces, args.light.photons);
-    let task = task(path, light, args.light.white)?;
-    let seen = views.field(&task, InstructionSet::detect(), progress)?;
+    let light = &args.light;
+    let options = scene_options(&light.file, light.bounces, light.photons, args.light.white)?;
+    let object = Object::read(path, &options, &plane, progress)?;
+    let depths = object.depths();
+    let seen = ObjectWave::new(plane, object).whole(progress)?;
     let work = &seen.work;
     report.add_serialised(
         "views",
@@ -52,8 +51,7 @@ pub(super) fn compute(
             seconds(work.field_seconds)
         ),
     );
-    let content =
-        npy::Content { depth: Some(seen.depths), eye: Some([0.0, 0.0, views.viewer]), ..npy::Content::default() };
+    let content = npy::Content { depth: Some(depths), eye: Some([0.0, 0.0, viewer]), ..npy::Content::default() };
     let origin = format!("true views of {}", args.input.display());
     npy::write_field(&args.output, &seen.field, &content, &origin)?;
     report.output("field", &args.output);

@@ -1,6 +1,6 @@
-//! Plates with parallax from left to right only, seen through a slit: rainbow holograms.
+//! Holograms with parallax from left to right only, seen through a slit: rainbow holograms.
 //!
-//! The plate is cut into strips, each as high as the viewer's eye separates. All lines from a strip's middle row (height
+//! The plane is cut into strips, each as high as the viewer's eye separates. All lines from a strip's middle row (height
 //! y_s) to the slit (a line of height Y at the viewer's distance D) lie in one plane, inclined by β with tan β = (Y − y_s)/D.
 //! A strip shows only what of the scene lies in its plane, and sends all its light to the slit. From there each strip is
 //! seen where it is, from left to right at true depth; above and below the slit it is dark. White light draws the slit out
@@ -26,9 +26,7 @@
 //! exp(ik(cos α − c)(G − G_b)) is a short power series, and every pixel is a sum of some moments of its column
 //! instead of one over all points. The series ends where its next term is below 1e-6.
 
-use super::geometry::{Rect, segment_center};
-use super::plate::Plate;
-use super::reference::Band;
+use super::plane::{ObjectBand, Rect, Segments};
 use crate::field::{Complex32, Complex64};
 use crate::points::colour::Lasers;
 use crate::points::luminance;
@@ -36,14 +34,14 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
-/// The slit of a plate, at the viewer's distance.
+/// The slit through which a plane is seen, at the viewer's distance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Slit {
-    /// Its height over the plate's middle [m].
+    /// Its height over the plane's middle [m].
     pub y: f64,
     /// How high it is [m].
     pub height: f64,
-    /// Rows of the plate that share what they show [px].
+    /// Rows of the plane that share what they show [px].
     pub strip: u64,
     /// Wavelengths of the strips, which take turns from the top [m].
     pub wavelengths: Vec<f64>,
@@ -51,7 +49,7 @@ pub struct Slit {
 
 impl Slit {
     /// The wavelength of a row [m].
-    pub fn wavelength_of(&self, row: i64) -> f64 {
+    pub(crate) fn wavelength_of(&self, row: i64) -> f64 {
         self.wavelength_of_strip(row.div_euclid(self.strip.max(1) as i64))
     }
 
@@ -60,19 +58,18 @@ impl Slit {
         self.wavelengths.get(turn as usize).copied().unwrap_or_default()
     }
 
-    /// Largest |sin β| of light from the plate to the slit.
-    pub fn steepest(&self, plate: &Plate) -> f64 {
-        let half = 0.5 * plate.height as f64 * plate.pitch_y;
-        let rise = half + self.y.abs() + 0.5 * self.height;
-        rise / rise.hypot(plate.viewer)
+    /// Largest |sin β| of light from a plane of a height [m] to the slit at a distance [m].
+    pub(crate) fn steepest(&self, plane_height: f64, distance: f64) -> f64 {
+        let rise = 0.5 * plane_height + self.y.abs() + 0.5 * self.height;
+        rise / rise.hypot(distance)
     }
 
-    /// How far the light of a strip's wavelength misses the slit when the strip is lit with the next one [m]; infinite for
-    /// one wavelength. `sine` is that of the reference's angle along y.
-    pub fn separation(&self, plate: &Plate, sine: f64) -> f64 {
+    /// How far the light of a strip's wavelength misses the slit at a distance [m] when the strip is lit with the next one
+    /// [m]; infinite for one wavelength. `sine` is that of the reference's angle along y.
+    pub(crate) fn separation(&self, distance: f64, sine: f64) -> f64 {
         let mut sorted = self.wavelengths.clone();
         sorted.sort_by(f64::total_cmp);
-        let shift = |pair: &[f64]| plate.viewer * sine.abs() * (pair[1] - pair[0]) / pair[1];
+        let shift = |pair: &[f64]| distance * sine.abs() * (pair[1] - pair[0]) / pair[1];
         sorted.windows(2).map(shift).fold(f64::INFINITY, f64::min)
     }
 }
@@ -82,7 +79,7 @@ impl Slit {
 pub(super) struct LinePoint {
     /// Place along the row [m].
     pub x: f64,
-    /// Place along the strip's plane [m]; negative behind the plate.
+    /// Place along the strip's plane [m]; negative behind the hologram.
     pub zeta: f64,
     /// a [√m], so that |u|² is the irradiance of a point as the eye's cells have them.
     pub amplitude: f32,
@@ -90,7 +87,7 @@ pub(super) struct LinePoint {
     pub phase: f64,
 }
 
-/// One strip of a plate.
+/// One strip of a plane.
 #[derive(Clone, Debug)]
 pub(super) struct Strip {
     /// Number of the strip from the top.
@@ -119,9 +116,9 @@ const TURN: f64 = 1.0;
 const LEFT_OUT: f64 = 1e-6;
 
 impl Strip {
-    pub(super) fn new(plate: &Plate, slit: &Slit, index: i64) -> Self {
-        let [_, y] = segment_center(plate, [0, index]);
-        let height = slit.strip as f64 * plate.pitch_y;
+    pub(super) fn new(plane: &Segments, slit: &Slit, index: i64) -> Self {
+        let [_, y] = plane.center([0, index]);
+        let height = slit.strip as f64 * plane.grid.pitch_y;
         let wavelength = slit.wavelength_of_strip(index);
         let laser = match slit.wavelengths[..] {
             [a, b, c] => Lasers::new([a, b, c]).ok().and_then(|lasers| {
@@ -136,7 +133,7 @@ impl Strip {
             height,
             wavelength,
             rise: slit.y - y,
-            distance: plate.viewer,
+            distance: plane.view.viewer,
             spread: slit.height / height,
             laser,
         }
@@ -161,7 +158,7 @@ impl Strip {
         self.laser.as_ref().map(|(_, place)| *place)
     }
 
-    /// Height of the plate at which the line from the slit through a place meets it, over the middle row [m].
+    /// Height of the plane at which the line from the slit through a place meets it, over the middle row [m].
     pub(super) fn meets(&self, y: f64, z: f64) -> f64 {
         let slit = self.y + self.rise;
         slit + (y - slit) * self.distance / (self.distance - z) - self.y
@@ -174,20 +171,14 @@ impl Strip {
     }
 
     /// The widest |sin α|.
-    pub(super) fn widest(&self, band: &Band) -> f64 {
+    pub(super) fn widest(&self, band: &ObjectBand) -> f64 {
         (band.half[0] * self.wavelength).min(0.95)
-    }
-
-    /// |ζ| at least, so that a point's wave is some pixels wide [m].
-    fn nearest(&self, plate: &Plate, widest: f64) -> f64 {
-        4.0 * plate.pitch_x / widest
     }
 
     /// Puts the field of points on the pixels of `rect` into `out`, which covers `whole`; the number of sums.
     pub(super) fn field(
         &self,
-        plate: &Plate,
-        band: &Band,
+        plane: &Segments,
         points: &[LinePoint],
         rect: &Rect,
         whole: &Rect,
@@ -196,12 +187,14 @@ impl Strip {
         if points.is_empty() || rect.area() == 0 {
             return 0.0;
         }
-        let widest = self.widest(band);
-        let (wavenumber, nearest) = (TAU / self.wavelength, self.nearest(plate, widest));
+        let grid = &plane.grid;
+        let widest = self.widest(&plane.band);
+        // |ζ| is at least so large that a point's wave is some pixels wide.
+        let (wavenumber, nearest) = (TAU / self.wavelength, 4.0 * grid.pitch_x / widest);
         // cos α lies between that of the widest angle and 1.
         let least = (1.0 - widest * widest).sqrt();
         let (middle, reach) = (0.5 * (1.0 + least), 0.5 * (1.0 - least));
-        let t = |row: i64| plate.y(row) - self.y;
+        let t = |row: i64| grid.y(row as usize) - self.y;
         let mut pairs = 0.0;
         let mut from = rect.y[0];
         while from < rect.y[1] {
@@ -227,7 +220,7 @@ impl Strip {
                 .par_chunks_mut(powers)
                 .enumerate()
                 .map(|(i, moments)| {
-                    let x = plate.x(rect.x[0] + i as i64);
+                    let x = grid.x(rect.x[0] as usize + i);
                     let mut count = 0.0;
                     for point in points {
                         let (dx, zeta) = (x - point.x, point.zeta.abs().max(nearest));
@@ -281,30 +274,25 @@ impl Strip {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::field::Grid;
     use crate::random::Random;
-    use std::path::Path;
+    use crate::segments::Viewing;
 
-    fn plate(slit: &str) -> Plate {
-        let text = format!(
-            "name = \"t\"\nsize = [320, 704]\npitch_x = \"0.8um\"\npitch_y = \"0.8um\"\nwavelength = \"638nm\"\nbits = 8\n\
-             tile = 64\n[reference]\nangle = [\"0deg\", \"-17deg\"]\n[slit]\n{slit}\n\
-             [scene]\nviewer = \"15mm\"\ndistance = \"2mm\"\n"
-        );
-        Plate::parse(&text, Path::new("t.toml")).expect("plate")
+    fn plane(y: f64, height: f64, strip: u64) -> (Segments, Slit) {
+        let grid = Grid::new(320, 704, 0.8e-6, 0.8e-6).expect("grid");
+        let slit = Slit { y, height, strip, wavelengths: vec![638e-9] };
+        let view = Viewing { viewer: 15e-3, place: -2e-3, ..Viewing::default() };
+        let size = [64, strip];
+        let plane = Segments::of_panel(grid, 638e-9, 64).expect("segments");
+        (Segments { size, slit: Some(slit.clone()), view, ..plane }, slit)
     }
 
     #[test]
     fn the_series_is_the_sum_of_the_points_waves() {
         // Steep towards the slit, wide along the row, behind and before the plate: the series is needed.
-        for (slit, strips) in [
-            ("height = \"0.3mm\"\ny = \"0.4mm\"\nstrip = 61", [0, 5, 10]),
-            ("height = \"0.01mm\"\nstrip = 64", [0, 3, 9]),
-        ] {
-            let plate = plate(slit);
-            let band = Band::of(&plate).expect("band");
-            let slit = plate.slit.clone().expect("slit");
+        for ((plane, slit), strips) in [(plane(0.4e-3, 0.3e-3, 61), [0, 5, 10]), (plane(0.0, 0.01e-3, 64), [0, 3, 9])] {
             for index in strips {
-                let strip = Strip::new(&plate, &slit, index);
+                let strip = Strip::new(&plane, &slit, index);
                 let random = &mut Random::new(3, index as u64);
                 let points: Vec<LinePoint> = (0..9)
                     .map(|i| LinePoint {
@@ -318,15 +306,15 @@ mod tests {
                 let whole = Rect { x: [20, 311], y: [row - 3, row + slit.strip as i64 + 5] };
                 let rect = Rect { x: [23, 300], y: [row, row + slit.strip as i64 + 2] };
                 let mut out = vec![Complex32::new(7.0, 7.0); whole.area()];
-                let pairs = strip.field(&plate, &band, &points, &rect, &whole, &mut out);
+                let pairs = strip.field(&plane, &points, &rect, &whole, &mut out);
                 assert!(pairs > 0.0);
                 let (mut error, mut norm) = (0.0, 0.0);
                 for row in rect.y[0]..rect.y[1] {
                     // G by Simpson's rule, of the angle that the definition names.
-                    let end = plate.y(row) - strip.y;
+                    let end = plane.grid.y(row as usize) - strip.y;
                     let sine = |t: f64| {
                         let rise = slit.y + slit.height * t / strip.height - (strip.y + t);
-                        rise / rise.hypot(plate.viewer)
+                        rise / rise.hypot(plane.view.viewer)
                     };
                     let steps = 40;
                     let path: f64 = (0..=steps)
@@ -338,9 +326,9 @@ mod tests {
                     for column in rect.x[0]..rect.x[1] {
                         let mut sum = Complex64::default();
                         for p in &points {
-                            let dx = plate.x(column) - p.x;
+                            let dx = plane.grid.x(column as usize) - p.x;
                             let rho = (dx * dx + p.zeta * p.zeta).sqrt();
-                            let part = (dx.abs() / rho) / (band.half[0] * strip.wavelength);
+                            let part = (dx.abs() / rho) / (plane.band.half[0] * strip.wavelength);
                             let window = match part {
                                 p if p <= 0.9 => 1.0,
                                 p if p < 1.0 => 0.5 + 0.5 * (PI * (p - 0.9) / 0.1).cos(),
@@ -365,16 +353,15 @@ mod tests {
     }
 
     #[test]
-    fn lines_from_the_slit_meet_the_plate_where_they_should() {
-        let plate = plate("height = \"0.3mm\"\ny = \"0.4mm\"\nstrip = 64");
-        let slit = plate.slit.clone().expect("slit");
-        let strip = Strip::new(&plate, &slit, 2);
+    fn lines_from_the_slit_meet_the_plane_where_they_should() {
+        let (plane, slit) = plane(0.4e-3, 0.3e-3, 64);
+        let (strip, viewer) = (Strip::new(&plane, &slit, 2), plane.view.viewer);
         let [sine, cosine] = strip.inclination();
         for z in [-2e-3, 0.0, 1.5e-3] {
             // In the strip's plane it meets the middle row; a point above does so above.
             let y = strip.y + z * sine / cosine;
             assert!(strip.meets(y, z).abs() < 1e-15);
-            assert!(strip.meets(y + 1e-5, z) > 0.9e-5 * plate.viewer / (plate.viewer - z));
+            assert!(strip.meets(y + 1e-5, z) > 0.9e-5 * viewer / (viewer - z));
         }
         assert!((slit.wavelength_of(0) - 638e-9).abs() < 1e-15);
     }
