@@ -3,7 +3,7 @@
 use super::*;
 use crate::field::{Field, Grid};
 use crate::hologram::{self, HologramSettings};
-use crate::illumination::rooms::Room;
+use crate::illumination::test_rooms::Room;
 use crate::illumination::{Illumination, IlluminationSettings};
 use crate::points::placement::Phase;
 use crate::points::trace::{TraceSettings, trace};
