@@ -1,6 +1,31 @@
 //! # holodrive: from a glTF room to light on a panel
 //!
-//! A holographic display driver for spatial light modulators. Data goes one way, and each step hands on one type:
+//! A holographic display driver for spatial light modulators: a scene becomes points, a hologram, a frame for a panel, and,
+//! on the simulated panel, the pictures that an eye sees.
+//!
+//! ```
+//! use holodrive::panel::{PanelProfile, Setup};
+//! use holodrive::pipeline::{self, Settings};
+//! use holodrive::progress::Progress;
+//!
+//! // 480 × 270 pixels of 8 µm with 256 levels over one turn, in the light of a helium-neon laser.
+//! let setup = Setup::new(PanelProfile::phase(480, 270, 8e-6, 8, 632.8e-9)?, None)?;
+//! let mut settings = Settings::default();
+//! (settings.scene.trace.width, settings.scene.trace.height) = (60, 60);
+//!
+//! let out = pipeline::run("scenes/cornell.gltf".as_ref(), &setup, &settings, &Progress::new())?;
+//!
+//! let hologram = out.holograms[0].as_ref().expect("one laser has light");
+//! assert_eq!(hologram.encoded.frame.levels.len(), 480 * 270);
+//! let (name, depth) = &out.points.view.focus[0];
+//! assert!(name == "near" && *depth < 0.0, "the nearest object stands behind the panel");
+//! let likeness = out.pictures.likeness.expect("a traced picture to compare with");
+//! println!("in focus at {depth:.3} m; PSNR {:.1} dB, SSIM {:.2}", likeness.psnr, likeness.ssim);
+//! # assert!(likeness.psnr_blocks > 10.0, "{likeness:?}");
+//! # Ok::<(), holodrive::Error>(())
+//! ```
+//!
+//! More stand in `tests/examples`. Data goes one way, and each step hands on one type:
 //!
 //! ```text
 //! glTF ──scene──▶ Scene ──illumination──▶ light on surfaces ──points──▶ PointCloud ──hologram──▶ Field
@@ -32,6 +57,44 @@
 //! parallel over what is written, never over a float sum.
 //!
 //! *Warnings* are returned as values; only the binary prints.
+//!
+//! # Glossary
+//!
+//! One term for one thing, from flag to file to field.
+//!
+//! | term | what it is |
+//! |---|---|
+//! | amplitude, phase | modulus and argument of a wave's complex field; *intensity* is the modulus squared |
+//! | bench | the simulated panel with its faults, and the stop behind it ([`pipeline::Bench`]) |
+//! | blaze | a linear phase that sends the object aside, off the zero order |
+//! | carrier | spatial frequency of the reference wave on the panel |
+//! | channel | which of a cloud's colours one laser shows |
+//! | conjugate | the second image of an amplitude hologram, on the other side of the panel |
+//! | coverage | which points a panel can diffract light to, and what is lost |
+//! | depth | z in the hologram frame: negative behind the panel, positive in front, everywhere |
+//! | drive level | the integer that a pixel's driver gets; a *curve* says which phase or amplitude it makes |
+//! | encoding | how a complex field becomes phases or amplitudes that a panel can show |
+//! | engine | how waves of points are summed |
+//! | exposure | one pattern on the panel under one laser ([`points::Exposure`]) |
+//! | fill factor, dead space | the share of a pixel that modulates, and the rest |
+//! | frame | drive levels for every pixel ([`panel::Frame`]) |
+//! | fringe | interference of object and reference wave, as an amplitude |
+//! | hogel, segment | a part of the panel or plate that shows the scene as seen from its own place ([`segments`]) |
+//! | irradiance, radiance, radiosity | flux per area received; per area and solid angle; per area leaving |
+//! | kinoform | the phase of a field, its amplitude dropped |
+//! | normal incidence | a reading wave along the panel's normal |
+//! | packing | how levels travel in a video signal |
+//! | patch, form factor | an element of the radiosity mesh; the share of one's light that reaches another |
+//! | pixel pitch | distance of neighbouring pixels |
+//! | plate | a printed hologram (`print`) |
+//! | reference wave | the wave that an amplitude hologram interferes with, and is read by |
+//! | setup | a panel in the light it is used in ([`panel::Setup`]) |
+//! | splat | the patch of wave that one point paints on a plane near it |
+//! | speckle | granular intensity of light with random phases; its *contrast* is σ/μ |
+//! | sub-frames | frames that follow each other faster than an eye sees |
+//! | wavefront error, correction | the phase that a panel's bend adds, and its opposite |
+//! | white | the radiance that a picture shows as white |
+//! | zero order | the light that leaves the panel unmodulated |
 //!
 //! # Rooms, from the ground up
 //!
@@ -92,3 +155,5 @@ pub mod serve;
 pub mod units;
 
 pub use error::{Error, Result};
+/// Vectors and matrices of the public interface.
+pub use glam;
