@@ -114,3 +114,181 @@ fn one_file_names_each_outside_crate_that_the_house_confines() {
         }
     }
 }
+
+/// The code of a file without its tests.
+fn without_tests(text: &str) -> String {
+    let mut out = String::new();
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        if line.trim() == "#[cfg(test)]" {
+            // Test modules stand last or are files of their own.
+            let next = lines.next().unwrap_or_default();
+            if next.contains("mod ") && next.trim_end().ends_with('{') {
+                break;
+            }
+            continue;
+        }
+        out += line.split("//").next().unwrap_or("");
+        out.push('\n');
+    }
+    out
+}
+
+/// All paths that begin with `crate`, `super` or `self`, groups of imports taken apart.
+fn paths(code: &str) -> Vec<Vec<String>> {
+    fn names(at: &mut std::str::Chars<'_>, before: &[String], out: &mut Vec<Vec<String>>) {
+        let mut path = before.to_vec();
+        loop {
+            let rest = at.as_str().trim_start();
+            *at = rest.chars();
+            if rest.starts_with('{') {
+                at.next();
+                while !at.as_str().trim_start().starts_with('}') && !at.as_str().is_empty() {
+                    names(at, &path, out);
+                    let rest = at.as_str().trim_start();
+                    *at = rest.strip_prefix(',').unwrap_or(rest).chars();
+                }
+                at.next();
+                return;
+            }
+            let name: String = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+            if name.is_empty() {
+                // A glob, or the end of what can be read.
+                at.next();
+                break;
+            }
+            *at = rest[name.len()..].chars();
+            path.push(name);
+            match at.as_str().strip_prefix("::") {
+                Some(rest) => *at = rest.chars(),
+                None => break,
+            }
+        }
+        out.push(path);
+    }
+    let mut out = Vec::new();
+    for root in ["crate::", "super::", "self::"] {
+        for (start, _) in code.match_indices(root) {
+            let before = code[..start].chars().next_back();
+            if before.is_none_or(|c| !c.is_alphanumeric() && c != '_' && c != '$' && c != ':') {
+                names(&mut code[start..].chars(), &[], &mut out);
+            }
+        }
+    }
+    out
+}
+
+/// Module path of a source file: `hologram/planes/paint.rs` → hologram, planes, paint.
+fn module(inside: &Path) -> Vec<String> {
+    let mut path: Vec<String> = inside.iter().map(|part| part.to_string_lossy().replace(".rs", "")).collect();
+    if path.last().is_some_and(|last| last == "mod") {
+        path.pop();
+    }
+    path
+}
+
+#[test]
+fn no_files_import_each_other_in_a_circle() {
+    let mut files = Vec::new();
+    sources(Path::new("src"), &mut files);
+    let inside = |file: &PathBuf| file.strip_prefix("src").expect("under src").to_path_buf();
+    let modules: Vec<Vec<String>> = files.iter().map(|file| module(&inside(file))).collect();
+    let mut uses: Vec<Vec<usize>> = vec![Vec::new(); files.len()];
+    let mut seen = 0;
+    for (file, own) in modules.iter().enumerate() {
+        if own.iter().any(|part| part.contains("test")) {
+            continue;
+        }
+        for path in paths(&without_tests(&fs::read_to_string(&files[file]).expect("source"))) {
+            let mut target: Vec<String> = Vec::new();
+            for (i, part) in path.iter().enumerate() {
+                match part.as_str() {
+                    "crate" if i == 0 => {}
+                    "self" if i == 0 => target = own.clone(),
+                    "super" if i == 0 => target = own[..own.len() - 1].to_vec(),
+                    "super" => drop(target.pop()),
+                    name => target.push(name.into()),
+                }
+            }
+            // The file that the longest part of the path names.
+            let found = (1..=target.len()).rev().find_map(|n| modules.iter().position(|m| *m == target[..n]));
+            let Some(other) = found else { continue };
+            seen += 1;
+            // A room's face and what is in it are one thing.
+            let (a, b) = (&modules[file], &modules[other]);
+            if !a.starts_with(b) && !b.starts_with(a) {
+                uses[file].push(other);
+            }
+        }
+    }
+    assert!(seen > 500, "only {seen} imports were seen: the test reads the sources wrongly");
+    let reaches = |from: usize| {
+        let (mut met, mut front) = (vec![false; files.len()], vec![from]);
+        while let Some(at) = front.pop() {
+            for &next in &uses[at] {
+                if !std::mem::replace(&mut met[next], true) {
+                    front.push(next);
+                }
+            }
+        }
+        met
+    };
+    let all: Vec<Vec<bool>> = (0..files.len()).map(reaches).collect();
+    let circles: Vec<String> = (0..files.len())
+        .flat_map(|a| uses[a].iter().map(move |&b| (a, b)))
+        .filter(|&(a, b)| a != b && all[b][a])
+        .map(|(a, b)| format!("{} -> {}", files[a].display(), files[b].display()))
+        .collect();
+    let mut circles = circles;
+    circles.sort();
+    circles.dedup();
+    assert!(circles.is_empty(), "imports that run in a circle:\n{}", circles.join("\n"));
+}
+
+#[test]
+fn every_entrance_walks_the_pipeline_and_light_is_simulated_in_one_place() {
+    let code = |file: &str| without_tests(&fs::read_to_string(file).unwrap_or_else(|_| panic!("{file}")));
+    let steps = ["points", "exposures", "field", "frame", "light", "pictures"];
+    let walks = [
+        // The steps that each entrance takes; what it does not take, it calls another one of these for.
+        ("src/cli/load.rs", vec!["points"]),
+        ("src/cli/holograms.rs", vec!["exposures", "field", "frame"]),
+        ("src/cli/show.rs", vec!["pictures"]),
+        ("src/cli/reconstruct.rs", vec!["light"]),
+        ("src/cli/sequence.rs", vec!["light"]),
+        ("src/cli/animate.rs", vec!["light"]),
+        ("src/sequence/animated.rs", vec!["exposures", "field", "frame"]),
+        ("src/live/worker.rs", vec!["exposures", "field", "frame"]),
+        ("src/live/viewer.rs", vec!["light"]),
+        ("src/comparison/mod.rs", vec!["frame", "light"]),
+        ("src/comparison/pictures.rs", vec!["points"]),
+    ];
+    let pipeline = code("src/pipeline.rs");
+    for step in steps {
+        assert!(pipeline.contains(&format!("pub fn {step}(")), "pipeline has no step `{step}`");
+        assert!(walks.iter().any(|(_, taken)| taken.contains(&step)), "nobody takes `{step}`");
+    }
+    for (file, taken) in walks {
+        for step in taken {
+            assert!(code(file).contains(&format!("pipeline::{step}(")), "{file} does not take pipeline::{step}");
+        }
+    }
+    // Commands and rooms above the pipeline do none of its steps by themselves.
+    let mut files = Vec::new();
+    sources(Path::new("src"), &mut files);
+    let own = ["simulate(", "simulated::simulate(", "hologram::compute(", "encode::encode(", "block_zero_order("];
+    for file in files {
+        let inside = file.strip_prefix("src").expect("under src").to_path_buf();
+        let above = ["cli", "live", "sequence", "comparison"].iter().any(|room| inside.starts_with(room));
+        if above && !inside.iter().any(|part| part.to_string_lossy().contains("test")) {
+            let text = without_tests(&fs::read_to_string(&file).expect("source"));
+            for step in own {
+                let called = text.match_indices(step).any(|(at, _)| {
+                    // A function of that name of its own is another thing.
+                    !text[..at].ends_with("fn ") && text[..at].ends_with("::")
+                });
+                assert!(!called, "{}: {step}…) is the pipeline's to call", file.display());
+            }
+        }
+    }
+}

@@ -3,8 +3,8 @@
 //! GDSII Stream Format, release 6.0: records of a 16-bit length, a type, a kind of data, all big-endian; reals with base 16.
 //! Runs of open pixels that are the same in the rows below become one rectangle.
 
-use super::export::{Exported, Reader};
 use super::plate::Raster;
+use super::reader::{Exported, Reader};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::progress::Progress;

@@ -22,6 +22,7 @@ mod plan;
 mod plate;
 mod plate_file;
 pub mod preview;
+mod reader;
 mod reference;
 mod shard;
 #[cfg(test)]
@@ -36,6 +37,7 @@ pub use job::{PlateJob, PrintReport, PrintSettings};
 pub use manifest::{Input, Manifest, Settings};
 pub use plan::{Plan, plan};
 pub use plate::{Binarisation, FileLayout, FringeSettings, Plate, Polarity, Quantity, Raster};
+pub use reader::{Exported, Reader};
 pub use reference::{Reference, Side};
 pub use shard::Shard;
 pub use view::{PlateView, ViewReport};

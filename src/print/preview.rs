@@ -8,8 +8,8 @@
 //! is that of the thinned field. That is carried to the pupil's plane by the exact angular spectrum about f_c, cut by the
 //! pupil, and carried back to the plane in focus.
 
-use super::export::Reader;
 use super::plate::Plate;
+use super::reader::Reader;
 use super::reference::frequency_range;
 use super::thinning::{Carried, Thinning, USABLE, thin};
 use crate::error::{Error, Result};

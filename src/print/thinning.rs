@@ -1,8 +1,8 @@
 //! The fringes of a finished plate in the light of the reference, limited to a band and thinned out.
 
-use super::export::Reader;
 use super::geometry::{plate_from_file, tile_in_file, tile_on_plate};
 use super::plate::{Plate, Polarity, Quantity};
+use super::reader::Reader;
 use crate::error::Result;
 use crate::field::{Complex32, Complex64};
 use crate::progress::Progress;

@@ -4,8 +4,8 @@
 //! as 64-bit numbers, then CRC-32C of those. One bit a pixel is a `bool` array with the codec `numcodecs.packbits`: a byte
 //! that counts the padding bits, then eight pixels a byte, the first one high.
 
-use super::export::{Exported, Reader};
 use super::plate::Raster;
+use super::reader::{Exported, Reader};
 use super::tiff::packed;
 use crate::error::Result;
 use crate::files;

@@ -1,6 +1,5 @@
 //! A hologram plane in rectangles of pixels and in segments, and the light that leaves it.
 
-use super::slit::Slit;
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::points::budget::EYE_ANGLE;
@@ -69,6 +68,47 @@ impl ObjectBand {
         let limit = [grid.limit_x(), grid.limit_y()];
         let half = [0, 1].map(|axis| (limit[axis] / f64::from(divisor[axis])).min(0.6 / wavelength));
         Self { divisor, half, angle: half.map(|f| (f * wavelength).asin()) }
+    }
+}
+
+/// The slit through which a plane is seen, at the viewer's distance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Slit {
+    /// Its height over the plane's middle [m].
+    pub y: f64,
+    /// How high it is [m].
+    pub height: f64,
+    /// Rows of the plane that share what they show [px].
+    pub strip: u64,
+    /// Wavelengths of the strips, which take turns from the top [m].
+    pub wavelengths: Vec<f64>,
+}
+
+impl Slit {
+    /// The wavelength of a row [m].
+    pub(crate) fn wavelength_of(&self, row: i64) -> f64 {
+        self.wavelength_of_strip(row.div_euclid(self.strip.max(1) as i64))
+    }
+
+    /// The wavelength of a strip, numbered from the top [m].
+    pub(super) fn wavelength_of_strip(&self, strip: i64) -> f64 {
+        let turn = strip.rem_euclid(self.wavelengths.len().max(1) as i64);
+        self.wavelengths.get(turn as usize).copied().unwrap_or_default()
+    }
+
+    /// Largest |sin β| of light from a plane of a height [m] to the slit at a distance [m].
+    pub(crate) fn steepest(&self, plane_height: f64, distance: f64) -> f64 {
+        let rise = 0.5 * plane_height + self.y.abs() + 0.5 * self.height;
+        rise / rise.hypot(distance)
+    }
+
+    /// How far the light of a strip's wavelength misses the slit at a distance [m] when the strip is lit with the next one
+    /// [m]; infinite for one wavelength. `sine` is that of the reference's angle along y.
+    pub(crate) fn separation(&self, distance: f64, sine: f64) -> f64 {
+        let mut sorted = self.wavelengths.clone();
+        sorted.sort_by(f64::total_cmp);
+        let shift = |pair: &[f64]| distance * sine.abs() * (pair[1] - pair[0]) / pair[1];
+        sorted.windows(2).map(shift).fold(f64::INFINITY, f64::min)
     }
 }
 

@@ -26,53 +26,12 @@
 //! exp(ik(cos α − c)(G − G_b)) is a short power series, and every pixel is a sum of some moments of its column
 //! instead of one over all points. The series ends where its next term is below 1e-6.
 
-use super::plane::{ObjectBand, Rect, Segments};
+use super::plane::{ObjectBand, Rect, Segments, Slit};
 use crate::field::{Complex32, Complex64};
 use crate::points::colour::Lasers;
 use crate::points::luminance;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
-
-/// The slit through which a plane is seen, at the viewer's distance.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Slit {
-    /// Its height over the plane's middle [m].
-    pub y: f64,
-    /// How high it is [m].
-    pub height: f64,
-    /// Rows of the plane that share what they show [px].
-    pub strip: u64,
-    /// Wavelengths of the strips, which take turns from the top [m].
-    pub wavelengths: Vec<f64>,
-}
-
-impl Slit {
-    /// The wavelength of a row [m].
-    pub(crate) fn wavelength_of(&self, row: i64) -> f64 {
-        self.wavelength_of_strip(row.div_euclid(self.strip.max(1) as i64))
-    }
-
-    fn wavelength_of_strip(&self, strip: i64) -> f64 {
-        let turn = strip.rem_euclid(self.wavelengths.len().max(1) as i64);
-        self.wavelengths.get(turn as usize).copied().unwrap_or_default()
-    }
-
-    /// Largest |sin β| of light from a plane of a height [m] to the slit at a distance [m].
-    pub(crate) fn steepest(&self, plane_height: f64, distance: f64) -> f64 {
-        let rise = 0.5 * plane_height + self.y.abs() + 0.5 * self.height;
-        rise / rise.hypot(distance)
-    }
-
-    /// How far the light of a strip's wavelength misses the slit at a distance [m] when the strip is lit with the next one
-    /// [m]; infinite for one wavelength. `sine` is that of the reference's angle along y.
-    pub(crate) fn separation(&self, distance: f64, sine: f64) -> f64 {
-        let mut sorted = self.wavelengths.clone();
-        sorted.sort_by(f64::total_cmp);
-        let shift = |pair: &[f64]| distance * sine.abs() * (pair[1] - pair[0]) / pair[1];
-        sorted.windows(2).map(shift).fold(f64::INFINITY, f64::min)
-    }
-}
 
 /// A point in a strip's plane.
 #[derive(Clone, Copy, Debug, PartialEq)]

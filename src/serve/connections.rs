@@ -1,5 +1,6 @@
 //! The server: who may connect, how many at once, and where their frames go. Each client has a thread of its own.
 
+use super::clients::{CONNECTIONS, Client, FRAMES, REFUSED, Shared};
 use super::conversation::Conversation;
 #[cfg(unix)]
 use super::local::LocalSocket;
@@ -9,9 +10,9 @@ use crate::error::{Error, Result};
 use std::io;
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -22,37 +23,6 @@ pub struct Server {
     listeners: Vec<(Address, JoinHandle<()>)>,
     slmsuite: Option<SocketAddr>,
     slmpy: Option<SocketAddr>,
-}
-
-/// What the clients' threads share.
-pub(super) struct Shared {
-    pub(super) panel: ServedPanel,
-    pub(super) patience: Duration,
-    pub(super) settle: Duration,
-    pub(super) calibrated: bool,
-    /// Bytes of requests that are held now.
-    pub(super) held: AtomicUsize,
-    pub(super) frames: SyncSender<FrameRequest>,
-    #[cfg(unix)]
-    local: Option<LocalSocket>,
-    connections: usize,
-    stopping: AtomicBool,
-    clients: Mutex<Vec<Arc<Client>>>,
-    counts: [AtomicU64; 3],
-}
-
-pub(super) const CONNECTIONS: usize = 0;
-pub(super) const FRAMES: usize = 1;
-pub(super) const REFUSED: usize = 2;
-
-/// One connection, as the others see it.
-pub(super) struct Client {
-    /// Running number over all clients, never used again.
-    pub(super) number: u64,
-    stream: Stream,
-    pub(super) heard: Mutex<Instant>,
-    /// Its frame is being shown: not to be cut off.
-    pub(super) answering: AtomicBool,
 }
 
 #[derive(Clone, Copy)]
@@ -147,7 +117,7 @@ impl Server {
                     break;
                 }
                 match accepted {
-                    Ok(stream) => Shared::start_client(&shared, stream, protocol),
+                    Ok(stream) => start_client(&shared, stream, protocol),
                     // Out of descriptors, or a client that went at once: neither may end the server, nor make it spin.
                     Err(_) => std::thread::sleep(Duration::from_millis(10)),
                 }
@@ -249,63 +219,37 @@ fn reachable(mut address: SocketAddr) -> SocketAddr {
     address
 }
 
-impl Shared {
-    pub(super) fn count(&self, what: usize) -> u64 {
-        self.counts[what].fetch_add(1, Ordering::Relaxed)
-    }
-
-    /// Where the local protocol's buffers lie.
-    #[cfg(unix)]
-    pub(super) fn local_folder(&self) -> &Path {
-        self.local.as_ref().map_or(Path::new("."), LocalSocket::folder)
-    }
-
-    /// Takes a client in, in a thread of its own; if there are too many, cuts off the longest silent one.
-    fn start_client(shared: &Arc<Self>, stream: Stream, protocol: Protocol) {
-        let number = shared.count(CONNECTIONS);
-        let Ok(handle) = stream.try_clone() else { return };
-        let (heard, answering) = (Mutex::new(Instant::now()), AtomicBool::new(false));
-        let client = Arc::new(Client { number, stream: handle, heard, answering });
-        {
-            let mut clients = shared.clients();
-            if clients.len() >= shared.connections {
-                shared.count(REFUSED);
-                let silent = clients.iter().enumerate().filter(|(_, client)| !client.answering.load(Ordering::SeqCst));
-                let Some((silent, _)) = silent.min_by_key(|(_, client)| client.heard()) else { return };
-                clients.remove(silent).stream.shutdown();
-            }
-            clients.push(Arc::clone(&client));
+/// Takes a client in, in a thread of its own; if there are too many, cuts off the longest silent one.
+fn start_client(shared: &Arc<Shared>, stream: Stream, protocol: Protocol) {
+    let number = shared.count(CONNECTIONS);
+    let Ok(handle) = stream.try_clone() else { return };
+    let (heard, answering) = (Mutex::new(Instant::now()), AtomicBool::new(false));
+    let client = Arc::new(Client { number, stream: handle, heard, answering });
+    {
+        let mut clients = shared.clients();
+        if clients.len() >= shared.connections {
+            shared.count(REFUSED);
+            let silent = clients.iter().enumerate().filter(|(_, client)| !client.answering.load(Ordering::SeqCst));
+            let Some((silent, _)) = silent.min_by_key(|(_, client)| client.heard()) else { return };
+            clients.remove(silent).stream.shutdown();
         }
-        let (worker, own) = (Arc::clone(shared), Arc::clone(&client));
-        let spawned = std::thread::Builder::new().name("client".into()).spawn(move || {
-            stream.prepare(worker.patience);
-            let mut conversation = Conversation::new(&worker, &own, stream);
-            // However it ends, it concerns this client only.
-            let _ = match protocol {
-                Protocol::Slmsuite => conversation.slmsuite(),
-                Protocol::Slmpy => conversation.slmpy(),
-                #[cfg(unix)]
-                Protocol::Local => conversation.local(),
-            };
-            drop(conversation);
-            worker.forget(&own);
-        });
-        if spawned.is_err() {
-            shared.forget(&client);
-        }
+        clients.push(Arc::clone(&client));
     }
-
-    fn forget(&self, client: &Arc<Client>) {
-        self.clients().retain(|other| !Arc::ptr_eq(other, client));
-    }
-
-    fn clients(&self) -> MutexGuard<'_, Vec<Arc<Client>>> {
-        self.clients.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Client {
-    fn heard(&self) -> Instant {
-        *self.heard.lock().unwrap_or_else(PoisonError::into_inner)
+    let (worker, own) = (Arc::clone(shared), Arc::clone(&client));
+    let spawned = std::thread::Builder::new().name("client".into()).spawn(move || {
+        stream.prepare(worker.patience);
+        let mut conversation = Conversation::new(&worker, &own, stream);
+        // However it ends, it concerns this client only.
+        let _ = match protocol {
+            Protocol::Slmsuite => conversation.slmsuite(),
+            Protocol::Slmpy => conversation.slmpy(),
+            #[cfg(unix)]
+            Protocol::Local => conversation.local(),
+        };
+        drop(conversation);
+        worker.forget(&own);
+    });
+    if spawned.is_err() {
+        shared.forget(&client);
     }
 }

@@ -1,6 +1,6 @@
 //! One client's talk with the server: read within limits of size and time, and answered.
 
-use super::connections::{Client, FRAMES, REFUSED, Shared};
+use super::clients::{Client, FRAMES, REFUSED, Shared};
 #[cfg(unix)]
 use super::local::{self, Buffer};
 use super::slmsuite::{Command, answer, description, hardware};
