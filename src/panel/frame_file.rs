@@ -165,7 +165,7 @@ pub(super) fn write_png(
         other => Error::unsupported(format!("{}: {other}", path.display())),
     };
     let json = metadata
-        .map(|metadata| serde_json::to_string(metadata))
+        .map(serde_json::to_string)
         .transpose()
         .map_err(|e| Error::unsupported(format!("{}: {e}", path.display())))?;
     files::write_whole(path, |file| {

@@ -137,7 +137,7 @@ impl Reader<'_> {
         let Some(info) = info else { return Ok(None) };
         // The schema has no place for this extension on normal textures, though the extension allows it there.
         let written = info.extensions.as_ref().and_then(|e| e.others.get("KHR_texture_transform"));
-        let transform = written.map(|value| TextureTransform::deserialize(value)).transpose();
+        let transform = written.map(TextureTransform::deserialize).transpose();
         let transform =
             transform.map_err(|why| self.document.error(format!("KHR_texture_transform of {}: {why}", self.name)))?;
         let reference = self.texture_ref(info.index, info.tex_coord, transform.as_ref(), false)?;
