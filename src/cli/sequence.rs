@@ -94,7 +94,7 @@ struct Opener {
 
 impl Opener {
     fn open(&self) -> Result<Prepared> {
-        Prepared::open(self.source.clone(), (&self.profile, self.named), self.wavelength, &self.stop)
+        Prepared::open(self.source.clone(), &self.profile, self.named, self.wavelength, &self.stop)
     }
 }
 

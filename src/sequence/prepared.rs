@@ -150,7 +150,8 @@ impl Prepared {
     /// [`Error::Io`] and [`Error::Input`] for what cannot be read or does not fit the panel.
     pub fn open(
         source: Source,
-        (profile, named): (&PanelProfile, bool),
+        profile: &PanelProfile,
+        named: bool,
         wavelength: Option<f64>,
         stop: &Arc<Progress>,
     ) -> Result<Self> {

@@ -24,7 +24,7 @@ fn raw(
     let path = folder.path().join("frames.raw");
     std::fs::write(&path, bytes).expect("write");
     let source = Source::Raw { path: Some(path), width: size.0, height: size.1, format };
-    (Prepared::open(source, (profile, true), None, &Arc::default()), folder)
+    (Prepared::open(source, profile, true, None, &Arc::default()), folder)
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn pictures_come_in_natural_order_and_packed_ones_as_they_are() {
     let pictures = pictures_in(folder.path()).expect("pictures");
     // The panel is what the pictures say, though the default is another.
     let default = PanelProfile::generic().expect("generic");
-    let sequence = Prepared::open(Source::Pictures(pictures), (&default, false), None, &Arc::default()).expect("opens");
+    let sequence = Prepared::open(Source::Pictures(pictures), &default, false, None, &Arc::default()).expect("opens");
     let seen: Vec<u16> =
         sequence.map(|shown| shown.expect("readable").levels().expect("levels")[0].levels[7]).collect();
     assert_eq!(seen, [1, 2, 10, 33]);
@@ -115,7 +115,7 @@ fn pictures_come_in_natural_order_and_packed_ones_as_they_are() {
     for named in [true, false] {
         let given = if named { &planes } else { &default };
         let source = Source::Pictures(vec![path.clone()]);
-        let mut sequence = Prepared::open(source, (given, named), None, &Arc::default()).expect("opens");
+        let mut sequence = Prepared::open(source, given, named, None, &Arc::default()).expect("opens");
         let shown = sequence.next().expect("frame").expect("readable");
         assert_eq!(shown.clone().signal().expect("signal").rgb, video.rgb);
         let unpacked = shown.levels().expect("levels");
