@@ -340,6 +340,6 @@ fn torn_tiles_are_found_and_redone_and_other_plates_refused() {
         ..settings.clone()
     };
     let refused = folder::look(path, &other).unwrap_err().to_string();
-    assert!(refused.contains("plate.fringe.bias is 0.5 there, 0.4 here"), "{refused}");
+    assert!(refused.contains("plate.bias is 0.5 there, 0.4 here"), "{refused}");
     assert!(folder::look(path, &settings).expect("the same").is_some());
 }
