@@ -11,7 +11,7 @@ use holodrive::names::Named;
 use holodrive::panel::{Frame, Origin, Setup};
 use holodrive::pipeline::{self, Settings};
 use holodrive::points::colour::NAMES;
-use holodrive::points::{Exposure, Share};
+use holodrive::points::{Exposure, Multiplexing, Share, SubFrames};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::colour::laser_powers;
 use holodrive::units::show_length;
@@ -49,7 +49,8 @@ fn add_exposure(exposure: &Exposure, part: Report, report: &mut Report) {
 impl Maker<'_> {
     /// The exposures of these points, and what the lasers' gamut does to their colours.
     pub(super) fn exposures(&self, points: &Points, report: &mut Report) -> Result<Vec<Exposure>> {
-        if let Some(frames) = self.settings.sub_frames.filter(|frames| points.cloud.points.len() < frames.count) {
+        let too_many = |f: &SubFrames| f.multiplexing == Multiplexing::Sparse && points.cloud.points.len() < f.count;
+        if let Some(frames) = self.settings.sub_frames.filter(too_many) {
             let what = format!("for {} points: one a frame at least", points.cloud.points.len());
             return Err(Error::out_of_range("subframes", frames.count, what));
         }

@@ -140,7 +140,8 @@ pub(crate) fn load_bytes(bytes: &[u8], options: &LoadOptions) -> holodrive::Resu
 pub(crate) fn assert_refused(loaded: holodrive::Result<Loaded>, words: &str) {
     let error = loaded.err().unwrap_or_else(|| panic!("it was loaded, and should have been refused: {words}"));
     let text = error.to_string();
-    assert!(matches!(error, holodrive::Error::Input { .. } | holodrive::Error::Parameter { .. }), "{text}");
+    use holodrive::Error::{Input, OutOfRange, Parameter};
+    assert!(matches!(error, Input { .. } | Parameter { .. } | OutOfRange { .. }), "{text}");
     assert!(text.contains(words), "'{text}' does not contain '{words}'");
     assert!(!text.contains('\n') && text.len() < 600, "not one line: {text}");
 }
