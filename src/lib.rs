@@ -6,12 +6,15 @@
 //! ```
 //! use holodrive::panel::{PanelProfile, Setup};
 //! use holodrive::pipeline::{self, Settings};
+//! use holodrive::points::WhitePoint;
 //! use holodrive::progress::Progress;
 //!
 //! // 480 × 270 pixels of 8 µm with 256 levels over one turn, in the light of a helium-neon laser.
 //! let setup = Setup::new(PanelProfile::phase(480, 270, 8e-6, 8, 632.8e-9)?, None)?;
 //! let mut settings = Settings::default();
 //! (settings.scene.trace.width, settings.scene.trace.height) = (60, 60);
+//! // The lamp burns out, as in a photograph: else it takes most of the panel's light.
+//! settings.scene.white = WhitePoint::Auto;
 //!
 //! let out = pipeline::run("scenes/cornell.gltf".as_ref(), &setup, &settings, &Progress::new())?;
 //!
@@ -21,7 +24,7 @@
 //! assert!(name == "near" && *depth < 0.0, "the nearest object stands behind the panel");
 //! let likeness = out.pictures.likeness.expect("a traced picture to compare with");
 //! println!("in focus at {depth:.3} m; PSNR {:.1} dB, SSIM {:.2}", likeness.psnr, likeness.ssim);
-//! # assert!(likeness.psnr_blocks > 10.0, "{likeness:?}");
+//! # assert!(likeness.psnr_blocks > 18.0 && likeness.ssim > 0.4, "{likeness:?}");
 //! # Ok::<(), holodrive::Error>(())
 //! ```
 //!

@@ -8,7 +8,7 @@ use holodrive::pipeline;
 use holodrive::progress::Progress;
 
 fn main() -> Result<()> {
-    let setup = Setup::new(PanelProfile::phase(640, 400, 6.4e-6, 10, 520e-9)?, None)?;
+    let setup = Setup::new(PanelProfile::phase(640, 400, 6.4e-6, 8, 520e-9)?, None)?;
     // A Gaussian beam that converges 0.2 m in front of the panel.
     let (grid, focal_length) = (setup.grid, 0.2);
     let samples = (0..grid.len())

@@ -5,6 +5,7 @@
 use holodrive::Result;
 use holodrive::panel::{PanelProfile, Setup};
 use holodrive::pipeline::{self, Settings};
+use holodrive::points::WhitePoint;
 use holodrive::progress::Progress;
 use std::path::PathBuf;
 
@@ -16,6 +17,9 @@ fn main() -> Result<()> {
     let setup = Setup::new(PanelProfile::phase(960, 540, 8e-6, 8, 632.8e-9)?, None)?;
     let mut settings = Settings::default();
     (settings.scene.trace.width, settings.scene.trace.height) = (120, 120);
+    // The lamp burns out, as in a photograph, and a stop keeps the panel's zero order out.
+    settings.scene.white = WhitePoint::Auto;
+    settings.bench.zero_order_stop = 0.05f64.to_radians();
     let out = pipeline::run(&scene, &setup, &settings, &Progress::new())?;
 
     holodrive::files::output_folder(&folder)?;
