@@ -107,7 +107,7 @@
 //! 2. [`names`]: closed sets whose values have names
 //! 3. [`progress`]: how long work tells that it moves on, and is told to stop
 //! 4. [`units`]: lengths and angles with units
-//! 5. [`config`]: TOML files whose quantities have units; errors name file and key
+//! 5. `config`: TOML files whose quantities have units; errors name file and key
 //! 6. [`files`]: files that appear whole or not at all
 //! 7. [`random`]: random numbers by seed and index
 //! 8. [`field`]: complex samples on a grid; index ↔ metre ↔ cycles/m; Fourier transforms; `.npy`
@@ -128,6 +128,9 @@
 //! 23. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
 //! 24. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols, a local one for Python; the panel kept for them
 //! 25. [`display`]: monitors and the fullscreen window (feature `display`)
+
+// Rooms below the plates hold some things that plates alone use.
+#![cfg_attr(not(feature = "print"), allow(dead_code, unused_imports))]
 
 pub mod calibration;
 pub mod comparison;

@@ -8,9 +8,9 @@ fn rooms() -> Vec<String> {
     let text = fs::read_to_string("src/lib.rs").expect("src/lib.rs");
     let rooms: Vec<String> = text
         .lines()
-        .filter_map(|line| line.strip_prefix("//! ")?.split_once(". [`"))
+        .filter_map(|line| line.strip_prefix("//! ")?.split_once(". "))
         .filter(|(number, _)| number.parse::<u32>().is_ok())
-        .filter_map(|(_, rest)| Some(rest.split_once('`')?.0.to_string()))
+        .filter_map(|(_, rest)| Some(rest.trim_start_matches('[').strip_prefix('`')?.split_once('`')?.0.to_string()))
         .collect();
     assert!(rooms.len() > 10, "the list of rooms in src/lib.rs was not found");
     rooms

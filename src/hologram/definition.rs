@@ -11,7 +11,7 @@
 //!
 //! Without W this is Weyl's integral, the spherical wave itself: a·e^{iφ}·e^{±ikr}/r, diverging from a point behind the
 //! panel and converging to one in front. W limits the wave to what the panel can diffract: flat up to (1−τ)·B and
-//! falling as an error function to B = 1/(2·pitch), τ = [`ROLL_OFF`],
+//! falling as an error function to B = 1/(2·pitch), τ = `ROLL_OFF`,
 //!
 //! ```text
 //! W(f) = ½ erfc((|f| − b)/s),   b = B(1 − τ/2),   s = τB / (2·2.63)

@@ -17,7 +17,7 @@ pub enum WhitePoint {
     /// Radiance is kept as it is.
     #[default]
     Unlimited,
-    /// Brightness is clipped at [`white_level`] of the picture, colour kept.
+    /// Brightness is clipped at `white_level` of the picture, colour kept.
     Auto,
     /// Brightness is clipped at this value [W/(m² sr)].
     At(f32),

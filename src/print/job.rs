@@ -96,7 +96,7 @@ impl PlateJob {
     /// Computes what is missing of the part, and finishes the plate when nothing is missing any more.
     ///
     /// # Errors
-    /// As [`folder::compute`] and, where it was not planned yet, [`plan`].
+    /// As `folder::compute` and, where it was not planned yet, [`plan`].
     pub fn run(mut self, progress: &Progress) -> Result<PrintReport> {
         let manifest = match self.manifest.take() {
             Some(manifest) => manifest,

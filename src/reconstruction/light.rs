@@ -49,7 +49,7 @@ pub enum Reconstruction {
 
 impl Light {
     /// A picture of one view on the rectangle ±`half` [m] of its focal plane, in `size` cells (columns, rows) or as many
-    /// as the panel has pixels there; in colour of radiance, the flat field divided out on a plane ([`Cone::flatten`]).
+    /// as the panel has pixels there; in colour of radiance, the flat field divided out on a plane (`Cone::flatten`).
     ///
     /// # Errors
     /// As [`super::picture`]; [`Error::Parameter`] where no exposure has light.
