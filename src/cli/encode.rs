@@ -51,16 +51,19 @@ fn encode_picture(args: &EncodeArgs, setup: &Setup, progress: &Progress, report:
     let begin = Instant::now();
     let usual = || Encoding::Planes(PlaneEncoding::new(PlaneMethod::Gradient));
     let chosen = args.encoding.encoding.clone().unwrap_or_else(usual);
-    let name = chosen.name();
+    if !matches!(chosen, Encoding::Planes(_)) {
+        let what = format!(
+            "{} encodes a field, not a picture: take plane-gradient, weighted, gerchberg-saxton or double-constraint, or \
+             compute the field first",
+            chosen.name()
+        );
+        return Err(Error::parameter("encoding", what));
+    }
     let flags = EncodingArgs { encoding: Some(chosen), ..args.encoding.clone() };
     let (settings, warnings) = resolve::encode(&flags, setup)?.settings(setup, setup.wavelength, None)?;
     report.warn(warnings);
     let Encoding::Planes(given) = &settings.encoding else {
-        let what = format!(
-            "{name} encodes a field, not a picture: take plane-gradient, weighted, gerchberg-saxton or \
-             double-constraint, or compute the field first"
-        );
-        return Err(Error::parameter("encoding", what));
+        return Err(Error::parameter("encoding", "is for fields"));
     };
     let (rgb, map) = match input(&args.input)? {
         Input::Images(rgb, map) => (rgb, Some(map)),
