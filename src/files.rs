@@ -13,6 +13,7 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// Numbers partial files, so that two threads that write the same name do not share one.
 static PARTIAL: AtomicU64 = AtomicU64::new(0);
@@ -22,8 +23,9 @@ static PARTIAL: AtomicU64 = AtomicU64::new(0);
 /// If `fill` or the disk fails, the partial file is removed and what stood at `path` before is untouched.
 pub fn write_whole(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
     let partial = partial_name(path);
+    with_begun(|begun| begun.push(partial.clone()));
     let written = (|| {
-        let file = File::create(&partial).map_err(Error::io(path))?;
+        let file = create(&partial).map_err(Error::io(path))?;
         let mut writer = BufWriter::with_capacity(1 << 20, file);
         fill(&mut writer)?;
         writer.flush().map_err(Error::io(path))?;
@@ -36,7 +38,20 @@ pub fn write_whole(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Resul
         // The first error is the one to report; a partial file that cannot be removed either changes nothing.
         let _ = fs::remove_file(&partial);
     }
+    with_begun(|begun| begun.retain(|other| *other != partial));
     written
+}
+
+/// Partial files that are being written.
+static BEGUN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn with_begun(change: impl FnOnce(&mut Vec<PathBuf>)) {
+    change(&mut BEGUN.lock().unwrap_or_else(PoisonError::into_inner));
+}
+
+/// Removes the partial files of this process, for one that ends at once.
+pub fn remove_begun() {
+    with_begun(|begun| begun.drain(..).for_each(|partial| drop(fs::remove_file(partial))));
 }
 
 /// Writes `bytes` as the whole content of `path`.
@@ -48,8 +63,19 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
 pub fn output_folder(path: &Path) -> Result<()> {
     fs::create_dir_all(path).map_err(Error::io(path))?;
     let probe = partial_name(&path.join("probe"));
-    File::create(&probe).map_err(Error::io(path))?;
+    create(&probe).map_err(Error::io(path))?;
     fs::remove_file(&probe).map_err(Error::io(path))
+}
+
+/// A new file; whatever has its name already, a link too, is removed and not written through.
+fn create(partial: &Path) -> std::io::Result<File> {
+    match File::create_new(partial) {
+        Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
+            fs::remove_file(partial)?;
+            File::create_new(partial)
+        }
+        other => other,
+    }
 }
 
 fn partial_name(path: &Path) -> PathBuf {

@@ -24,6 +24,8 @@ pub struct Progress {
     done: AtomicU64,
     total: AtomicU64,
     stop: Arc<AtomicBool>,
+    /// Whether the job has seen that it is to stop.
+    heard: Arc<AtomicBool>,
 }
 
 impl Progress {
@@ -33,7 +35,7 @@ impl Progress {
     }
     /// A part of this job with counters of its own that nobody watches; it is stopped with the whole.
     pub fn part(&self) -> Self {
-        Self { stop: Arc::clone(&self.stop), ..Self::default() }
+        Self { stop: Arc::clone(&self.stop), heard: Arc::clone(&self.heard), ..Self::default() }
     }
     /// Names the step that begins and the amount of work in it (any unit; 0 when unknown).
     pub fn start(&self, step: &str, total: u64) {
@@ -53,7 +55,15 @@ impl Progress {
     }
     /// Whether the job was asked to end: for loops that cannot return an error.
     pub fn stopped(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
+        let stopped = self.stop.load(Ordering::Relaxed);
+        if stopped {
+            self.heard.store(true, Ordering::Relaxed);
+        }
+        stopped
+    }
+    /// Whether the job has seen that it was asked to end.
+    pub fn has_heard(&self) -> bool {
+        self.heard.load(Ordering::Relaxed)
     }
     /// Fails with [`Error::Interrupted`] once the job was asked to end.
     pub fn check(&self) -> Result<()> {

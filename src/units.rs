@@ -39,7 +39,7 @@ const FREQUENCIES: [(&str, f64); 3] = [("Hz", 1.0), ("kHz", 1e3), ("MHz", 1e6)];
 /// Units of memory by their factor to bytes; as the error of a job that does not fit counts them.
 const MEMORIES: [(&str, f64); 3] = [("kB", 1024.0), ("MB", 1048576.0), ("GB", 1073741824.0)];
 
-fn parse(text: &str, units: &[(&str, f64)], kind: &'static str, example: &str) -> Result<f64> {
+fn parse(text: &str, units: &[(&'static str, f64)], kind: &'static str, example: &str) -> Result<f64> {
     let text = text.trim();
     let split = text
         .char_indices()
@@ -66,8 +66,21 @@ fn parse(text: &str, units: &[(&str, f64)], kind: &'static str, example: &str) -
     if !value.is_finite() {
         return Err(Error::parameter(kind, format!("`{text}` is not finite")));
     }
+    if value.abs() > LARGEST || (value != 0.0 && value.abs() < SMALLEST) {
+        let what = format!("must lie between {SMALLEST:e} and {LARGEST:e} {}", unit_of(units));
+        return Err(Error::out_of_range(kind, quoted(text), what));
+    }
     Ok(value)
 }
+
+/// The unit that is 1.
+fn unit_of(units: &[(&'static str, f64)]) -> &'static str {
+    units.iter().find(|(_, factor)| *factor == 1.0).map_or("bytes", |(name, _)| name)
+}
+
+/// No quantity of a bench passes these, in its own unit: beyond them squares and cubes of numbers are none any more.
+const LARGEST: f64 = 1e12;
+const SMALLEST: f64 = 1e-18;
 
 /// The value, if it is greater than zero.
 fn positive(value: f64, text: &str, kind: &'static str) -> Result<f64> {
@@ -101,7 +114,12 @@ pub fn angle(text: &str) -> Result<f64> {
 /// Reads a time with its unit that is not negative: `10ms` → 0.01 [s].
 pub fn duration(text: &str) -> Result<f64> {
     let value = parse(text, &TIMES, "time", "10ms, 0.5s")?;
-    if value >= 0.0 { Ok(value) } else { Err(Error::out_of_range("time", quoted(text), "must not be negative")) }
+    match value {
+        ..0.0 => Err(Error::out_of_range("time", quoted(text), "must not be negative")),
+        // A day: a clock counts no more than so many.
+        86_400.0.. => Err(Error::out_of_range("time", quoted(text), "must be less than a day")),
+        _ => Ok(value),
+    }
 }
 
 /// Reads a positive rate with its unit: `60Hz` → 60 [Hz].
@@ -123,6 +141,12 @@ pub fn show_length(metres: f64) -> String {
     let number = format!("{:.*}", digits, metres / factor);
     let number = if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { &number };
     format!("{number}{unit}")
+}
+
+/// Prints a pitch along x and y [m], as one length where they are the same.
+pub fn show_pitch([x, y]: [f64; 2]) -> String {
+    let [x, y] = [x, y].map(show_length);
+    if x == y { x } else { format!("{x}×{y}") }
 }
 
 #[cfg(test)]

@@ -129,12 +129,20 @@ pub(crate) fn offset(index: f64, count: f64, pitch: f64) -> f64 {
     (index - (count - 1.0) * 0.5) * pitch
 }
 
-/// Refuses a length [m] that is not positive and finite.
+/// Smallest and largest length [m] that is taken for one: beyond them phases and areas lose their digits.
+pub(crate) const LENGTHS: std::ops::RangeInclusive<f64> = 1e-12..=1e9;
+
+/// Refuses a length [m] that is not positive and finite, or none of a bench.
 pub(crate) fn positive(name: &'static str, length: f64) -> Result<()> {
-    if length.is_finite() && length > 0.0 {
+    if LENGTHS.contains(&length) {
         return Ok(());
     }
-    Err(Error::out_of_range(name, format_args!("{length} m"), "must be greater than zero and finite"))
+    let limit = if length.is_finite() && length > 0.0 {
+        "must lie between 1e-12 and 1e9 m"
+    } else {
+        "must be greater than zero and finite"
+    };
+    Err(Error::out_of_range(name, format_args!("{length:e} m"), limit))
 }
 
 /// Refuses a distance [m] that is not finite.

@@ -1,10 +1,14 @@
 //! The scalar light field on a plane: complex samples on a [`Grid`] at one wavelength.
 
+pub mod arrays;
 pub mod fft;
 pub mod grid;
 mod memory;
 pub mod npy;
+mod npy_head;
 pub mod npy_stack;
+pub(crate) mod npy_zip;
+pub mod stored;
 
 pub(crate) use fft::{Fft1, fast_length};
 pub use fft::{Fft2, FftNum};

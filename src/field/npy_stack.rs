@@ -1,7 +1,7 @@
 //! Arrays of many frames of whole numbers (`.npy`), read frame by frame.
 
+use super::npy_head::Head;
 use crate::error::{Error, Result};
-use npyz::{NpyHeader, Order};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
@@ -32,32 +32,35 @@ impl LevelStack {
         let file = File::open(path).map_err(Error::io(path))?;
         let length = file.metadata().map_err(Error::io(path))?.len();
         let mut reader = BufReader::with_capacity(1 << 20, file);
-        let header =
-            NpyHeader::from_reader(&mut reader).map_err(|e| Error::input(path, format!("not a .npy file: {e}")))?;
+        let head = Head::read(&mut reader).map_err(|why| Error::input(path, format!("not a .npy file: {why}")))?;
         // Whether a value has two bytes, and then whether the high one comes first.
-        let wide = match header.dtype().descr().trim_matches('\'') {
+        let wide = match head.kind.as_str() {
             "|u1" | "|b1" | "<u1" => None,
             "<u2" => Some(false),
             ">u2" => Some(true),
             _ => return Ok(None),
         };
-        if header.order() != Order::C {
+        // One frame in another order is read as a whole.
+        if head.fortran && head.shape.len() == 2 {
+            return Ok(None);
+        }
+        if head.fortran {
             return Err(Error::input(path, "stored in Fortran order; save it with numpy.ascontiguousarray"));
         }
         let refused = || {
             let what = format!(
                 "shape {:?}; frames × rows × columns are needed, of three channels where the values are a video signal",
-                header.shape()
+                head.shape
             );
             Error::input(path, what)
         };
-        let (frames, height, width, channels) = match *header.shape() {
+        let (frames, height, width, channels) = match head.shape[..] {
             [height, width] => (1, height, width, 1),
             [frames, height, width] => (frames, height, width, 1),
             [frames, height, width, 3] => (frames, height, width, 3),
             _ => return Err(refused()),
         };
-        let sides = [frames, height, width, channels, if wide.is_some() { 2 } else { 1 }];
+        let sides = [frames, height, width, channels, if wide.is_some() { 2 } else { 1 }].map(|side| side as u64);
         // A header can promise any size; what it promises must be in the file before memory is taken for it.
         let promised = sides.iter().try_fold(1u64, |n, &side| n.checked_mul(side)).ok_or_else(refused)?;
         if promised == 0 {
@@ -71,7 +74,6 @@ impl LevelStack {
             );
             return Err(Error::input(path, what));
         }
-        let [frames, height, width, channels] = [frames, height, width, channels].map(|side| side as usize);
         Ok(Some(Self { path: path.into(), reader, frames, height, width, channels, wide, next: 0 }))
     }
 
