@@ -82,6 +82,8 @@ pub enum LightKind {
     Directional,
     /// Equal in all directions.
     Point,
+    /// A point at an eye: as [`LightKind::Point`], and through the backs of one-sided surfaces, as the eye sees.
+    Eye,
     /// A cone: full inside `inner`, none outside `outer` (half angles, [rad]).
     Spot {
         /// Half angle of full intensity [rad].

@@ -1,10 +1,14 @@
 //! The parsed file: container, schema, extensions, checked look-ups.
 
 use super::Choice;
-use super::resources::{self, MAX_FILE_BYTES};
+use super::converted;
+use super::packed;
+use super::resources::{self, MAX_FILE_BYTES, Source};
+use super::rewritten::rewrite;
 use crate::error::{Error, Result};
 use crate::scene::Warning;
 use gltf::json;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Extensions that are read; any other is refused where a file requires it and left out where it does not.
@@ -12,14 +16,27 @@ use std::path::{Path, PathBuf};
 /// KHR_lights_punctual and KHR_materials_emissive_strength speak of candela, lux and nit; their numbers are taken as
 /// W/sr, W/m² and W/(m² sr), which keeps all ratios.
 pub const UNDERSTOOD_EXTENSIONS: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
+    #[cfg(feature = "meshopt")]
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_animation_pointer",
+    #[cfg(feature = "draco")]
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    #[cfg(feature = "meshopt")]
+    "KHR_meshopt_compression",
+    "KHR_node_visibility",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
 
@@ -29,24 +46,40 @@ pub(super) struct Document {
     pub(super) path: PathBuf,
     /// The JSON part. Its indices are unchecked: use [`Document::get`].
     pub(super) root: json::Root,
+    /// Whether URIs may point outside of the file's folder.
+    pub(super) allow_outside: bool,
     /// Content of each buffer, at least as long as the file says.
     buffers: Vec<Vec<u8>>,
 }
 
 impl Document {
     /// Reads the file and its buffers, and checks version and extensions.
-    pub(super) fn open(path: &Path, warnings: &mut Vec<Warning>) -> Result<Self> {
+    pub(super) fn open(path: &Path, allow_outside: bool, warnings: &mut Vec<Warning>) -> Result<Self> {
         let bytes = resources::read_file(path, MAX_FILE_BYTES).map_err(|why| Error::input(path, why))?;
-        let (text, mut chunk) =
-            if bytes.starts_with(b"glTF") { split_glb(path, &bytes)? } else { (bytes.as_slice(), None) };
-        let root = parse(path, text)?;
+        let source = Source { scene: path, allow_outside };
+        let told = converted::convert(source, &bytes, warnings).map_err(|why| Error::input(path, why))?;
+        let (mut root, mut chunk) = match told {
+            Some(told) => {
+                let root = serde_json::from_value(told.file).map_err(|why| Error::input(path, why.to_string()))?;
+                (root, Some(Cow::Owned(told.buffer)))
+            }
+            None => {
+                let (text, chunk) =
+                    if bytes.starts_with(b"glTF") { split_glb(path, &bytes)? } else { (&bytes[..], None) };
+                (parse(path, text, warnings)?, chunk.map(Cow::Borrowed))
+            }
+        };
         check_extensions(path, &root, warnings)?;
         let mut buffers = Vec::with_capacity(root.buffers.len());
         for (i, buffer) in root.buffers.iter().enumerate() {
             let fail = |why: String| Error::input(path, format!("buffer {i}: {why}"));
             let content = match &buffer.uri {
-                Some(uri) => resources::read_uri(path, uri, MAX_FILE_BYTES).map_err(fail)?,
-                None if i == 0 => chunk.take().map(<[u8]>::to_vec).ok_or_else(|| {
+                Some(uri) => resources::read_uri(source, uri, MAX_FILE_BYTES).map_err(fail)?,
+                None if packed::is_fallback(buffer) => {
+                    buffers.push(Vec::new());
+                    continue;
+                }
+                None if i == 0 => chunk.take().map(Cow::into_owned).ok_or_else(|| {
                     fail("it has no URI, and the file has no binary chunk; export it again with its data".into())
                 })?,
                 None => return Err(fail("it has no URI, and only buffer 0 may be the binary chunk of a .glb".into())),
@@ -60,12 +93,18 @@ impl Document {
             }
             buffers.push(content);
         }
-        Ok(Self { path: path.to_path_buf(), root, buffers })
+        packed::unpack(path, &mut root, &mut buffers)?;
+        Ok(Self { path: path.to_path_buf(), root, allow_outside, buffers })
     }
 
     /// An [`Error::Input`] for this file.
     pub(super) fn error(&self, what: impl Into<String>) -> Error {
         Error::input(&self.path, what)
+    }
+
+    /// From where its URIs are read.
+    pub(super) fn source(&self) -> Source<'_> {
+        Source { scene: &self.path, allow_outside: self.allow_outside }
     }
 
     /// What a node is called in messages.
@@ -161,11 +200,16 @@ fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [
     Ok((text, binary))
 }
 
-fn parse(path: &Path, text: &[u8]) -> Result<json::Root> {
+fn parse(path: &Path, text: &[u8], warnings: &mut Vec<Warning>) -> Result<json::Root> {
     // Some exporters begin with a byte order mark or fill the chunk with zeros; neither is JSON.
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     let end = text.iter().rposition(|&b| b != 0).map_or(0, |last| last + 1);
-    let root: json::Root = serde_json::from_slice(&text[..end]).map_err(|why| {
+    let mut read = || -> serde_json::Result<json::Root> {
+        let mut file: serde_json::Value = serde_json::from_slice(&text[..end])?;
+        rewrite(&mut file, warnings);
+        serde_json::from_value(file)
+    };
+    let root: json::Root = read().map_err(|why| {
         #[derive(serde::Deserialize)]
         struct Asset {
             version: String,
@@ -198,7 +242,11 @@ fn check_extensions(path: &Path, root: &json::Root, warnings: &mut Vec<Warning>)
     if !required.is_empty() {
         return Err(Error::input(
             path,
-            format!("it requires {}, which is not understood; export it without", required.join(", ")),
+            format!(
+                "it requires {}, which is not understood; export it without{}",
+                required.join(", "),
+                if required.iter().any(|name| name.contains("compression")) { " compression" } else { "" }
+            ),
         ));
     }
     for name in root.extensions_used.iter().filter(unknown) {

@@ -69,7 +69,7 @@ impl Textures {
     ) -> Result<Option<Texture>> {
         let Some(image) = document.root.images.get(texture.source.value()) else {
             let name = texture.name.as_deref().unwrap_or("without a name");
-            warnings.push(Warning(format!("texture {name}: it has no PNG or JPEG image and is left out")));
+            warnings.push(Warning(format!("texture {name}: it has no image and is left out")));
             return Ok(None);
         };
         let number = texture.source.value();
@@ -119,19 +119,19 @@ fn image_name(image: &json::Image, number: usize) -> String {
 fn image_bytes(document: &Document, image: &json::Image) -> Result<std::result::Result<Vec<u8>, String>> {
     Ok(match (image.buffer_view, &image.uri) {
         (Some(view), _) => Ok(document.view(view, "an image")?.to_vec()),
-        (None, Some(uri)) => read_uri(&document.path, uri, MAX_FILE_BYTES),
+        (None, Some(uri)) => read_uri(document.source(), uri, MAX_FILE_BYTES),
         (None, None) => Err("it has neither a URI nor a buffer view".to_owned()),
     })
 }
 
-/// Decodes PNG, JPEG or plain KTX2 by content, whatever the file's name or declared type says.
+/// Decodes PNG, JPEG, WebP or plain KTX2 by content, whatever the file's name or declared type says.
 fn decode_picture(bytes: &[u8]) -> std::result::Result<image::RgbaImage, String> {
     if bytes.starts_with(ktx2::IDENTIFIER) {
         return ktx2::decode(bytes, MAX_IMAGE_SIDE, MAX_DECODER_BYTES);
     }
     let format = match image::guess_format(bytes) {
-        Ok(format @ (image::ImageFormat::Png | image::ImageFormat::Jpeg)) => format,
-        _ => return Err("only PNG and JPEG images are read, and it is neither; convert it".to_owned()),
+        Ok(format @ (image::ImageFormat::Png | image::ImageFormat::Jpeg | image::ImageFormat::WebP)) => format,
+        _ => return Err("only PNG, JPEG and WebP images are read, and it is none of them; convert it".to_owned()),
     };
     let mut reader = image::ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = image::Limits::default();
@@ -176,6 +176,6 @@ mod tests {
         assert!(decode_picture(b"").is_err());
         let mut bmp = Vec::new();
         pixels.write_to(&mut Cursor::new(&mut bmp), image::ImageFormat::Bmp).expect("encode");
-        assert!(decode_picture(&bmp).is_err_and(|why| why.contains("PNG and JPEG")));
+        assert!(decode_picture(&bmp).is_err_and(|why| why.contains("PNG, JPEG and WebP")));
     }
 }

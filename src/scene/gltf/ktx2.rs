@@ -1,7 +1,8 @@
 //! KTX2 images whose texels are plain: 8-bit unsigned with one to four channels, stored as they are or by Zstandard.
 //!
-//! (Khronos KTX File Format Specification 2.0: header, level index, `supercompressionScheme` 0 and 2.) Block compression
-//! (BC, ETC, ASTC) and Basis Universal are refused by name: a loader that needs them belongs to a graphics driver.
+//! (Khronos KTX File Format Specification 2.0: header, level index, `supercompressionScheme` 0 and 2.) Basis Universal
+//! (ETC1S and UASTC) is read by the crate `basisu`, with the feature of that name. Block compression (BC, ETC, ASTC) is
+//! refused by name: a loader that needs it belongs to a graphics driver.
 
 use std::io::Read;
 
@@ -46,6 +47,10 @@ pub(super) fn decode(bytes: &[u8], side: u32, most: u64) -> Result<image::RgbaIm
         return Err(format!("it is a KTX2 image of {width} × {height} texels; at most {side} a side are read"));
     }
     let convert = "only plain 8-bit texels, uncompressed or by Zstandard, are read from KTX2; convert it to PNG";
+    #[cfg(feature = "basisu")]
+    if format == 0 {
+        return basis_universal(bytes, width, height, most);
+    }
     let Some((count, places)) = channels(format) else {
         return Err(match format {
             0 => format!("it is a KTX2 image in Basis Universal; {convert}"),
@@ -85,6 +90,25 @@ pub(super) fn decode(bytes: &[u8], side: u32, most: u64) -> Result<image::RgbaIm
     image::RgbaImage::from_raw(width, height, rgba.collect()).ok_or_else(cut)
 }
 
+/// Decodes the largest level of a picture in Basis Universal.
+#[cfg(feature = "basisu")]
+fn basis_universal(bytes: &[u8], width: u32, height: u32, most: u64) -> Result<image::RgbaImage, String> {
+    use basisu::{DecodeFlags, TargetFormat, Transcoder};
+    let size = 4 * u64::from(width) * u64::from(height);
+    if size > most {
+        return Err(format!("it is a KTX2 image of {size} bytes; at most {most} are read"));
+    }
+    let damaged =
+        |why: basisu::Error| format!("it is a KTX2 image in Basis Universal that cannot be unpacked ({why:?})");
+    let picture = Transcoder::new(bytes).map_err(damaged)?;
+    if !picture.supports(TargetFormat::Rgba32) {
+        return Err("it is a KTX2 image in Basis Universal of high dynamic range, which is not read".to_owned());
+    }
+    let texels = picture.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE).map_err(damaged)?;
+    image::RgbaImage::from_raw(width, height, texels)
+        .ok_or_else(|| format!("it is a KTX2 image in Basis Universal that is not of {width} × {height} texels"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -115,6 +139,36 @@ mod tests {
         // A Zstandard frame by hand: magic, single segment with a size of one byte (6), one raw last block of 6 bytes.
         let packed = [0x28, 0xb5, 0x2f, 0xfd, 0x20, 6, 0x31, 0, 0, 1, 2, 3, 4, 5, 6];
         assert_eq!(read(&file(23, (2, 1), 2, &packed)).expect("zstd"), [1, 2, 3, 255, 4, 5, 6, 255]);
+    }
+
+    /// UASTC: blocks of one colour each (mode 8: five bits of code, four bytes of colour).
+    #[cfg(feature = "basisu")]
+    #[test]
+    fn basis_universal_gives_the_colours_of_its_blocks() {
+        let block = |rgba: [u8; 4]| (0x17 | u128::from(u32::from_le_bytes(rgba)) << 5).to_le_bytes();
+        let blocks = [block([10, 20, 30, 255]), block([200, 100, 0, 128])].concat();
+        let (descriptor, data) = (104u32, 104u32 + 44);
+        let mut bytes = IDENTIFIER.to_vec();
+        for word in [0, 1, 6, 3, 0, 0, 1, 1, 0, descriptor, 44, 0, 0, 0, 0, 0, 0] {
+            bytes.extend(u32::to_le_bytes(word));
+        }
+        for long in [u64::from(data), blocks.len() as u64, blocks.len() as u64] {
+            bytes.extend(long.to_le_bytes());
+        }
+        // Data format descriptor: model 166 (UASTC), primaries 1, transfer 2 (sRGB), blocks of 4 × 4, one sample of RGBA.
+        for word in
+            [44u32, 0, 2 | 40 << 16, 166 | 1 << 8 | 2 << 16, 3 | 3 << 8, 16, 0, 3 << 24 | 127 << 16, 0, 0, u32::MAX]
+        {
+            bytes.extend(word.to_le_bytes());
+        }
+        bytes.extend(&blocks);
+        let picture = decode(&bytes, 1024, 1 << 20).expect("picture");
+        assert_eq!(picture.dimensions(), (6, 3));
+        assert_eq!(picture.get_pixel(3, 2).0, [10, 20, 30, 255]);
+        assert_eq!(picture.get_pixel(4, 0).0, [200, 100, 0, 128]);
+        for end in 0..bytes.len() {
+            assert!(read(&bytes[..end]).is_err(), "{end}");
+        }
     }
 
     #[test]

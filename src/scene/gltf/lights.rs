@@ -5,6 +5,7 @@ use super::cameras::rigid;
 use super::document::Document;
 use super::meshes::UsedMaterials;
 use super::nodes::Nodes;
+use super::own_light::lit_share;
 use crate::error::Result;
 use crate::scene::{LightKind, Material, PunctualLight, Scene, TextureRef, Warning};
 use glam::{DVec3, Vec3};
@@ -18,6 +19,13 @@ const KEY_IRRADIANCE: f32 = 2.2;
 
 /// Irradiance that the point light at the camera gives at the middle of the scene [W/m²].
 const FILL_IRRADIANCE: f32 = 0.8;
+
+/// What is said where the default light is added.
+const ADDED: &str = "it is lit by a directional light of 2.2 W/m² from the viewer's upper left and a point light at the \
+    camera that gives 0.8 W/m² at the middle of the scene";
+
+/// Share of what the camera sees that a file's own emission must light.
+const LEAST_LIT: f64 = 0.25;
 
 /// From where the directional light comes, in camera axes: the viewer's upper left, in front of the scene.
 const KEY_FROM: DVec3 = DVec3::new(-0.5, 0.8, 0.6);
@@ -71,12 +79,14 @@ fn kind(document: &Document, light: &Light, what: &str) -> Result<LightKind> {
 }
 
 /// Makes sure that the scene is lit. A file without any light gets that of [`super::load`], and so does any file on
-/// request. A file whose lights are all turned down to zero is refused: that is hardly what was meant.
+/// request, and one whose emission lights less than a quarter of what its camera sees ([`lit_share`], which is `known` from
+/// an earlier pose, so that a film does not change its light). A file whose lights are all turned down to zero is refused: that is hardly what was meant.
 pub(super) fn ensure_light(
     document: &Document,
     scene: &mut Scene,
     used: &UsedMaterials,
     options: &LoadOptions,
+    known: &mut Option<Option<f64>>,
     warnings: &mut Vec<Warning>,
 ) -> Result<()> {
     if options.viewer_light {
@@ -93,7 +103,24 @@ pub(super) fn ensure_light(
         (m.emissive * picture).max_element() > 0.0
     };
     let lit = scene.lights.iter().any(|light| light.intensity.max_element() > 0.0) || scene.materials.iter().any(emits);
-    if lit || scene.materials.iter().all(|m| m.unlit) {
+    if scene.materials.iter().all(|m| m.unlit) {
+        return Ok(());
+    }
+    if lit {
+        let punctual = scene.lights.iter().any(|light| light.intensity.max_element() > 0.0);
+        let share = match (punctual, *known) {
+            (true, _) => None,
+            (false, Some(share)) => share,
+            (false, None) => *known.insert(lit_share(scene)),
+        };
+        if let Some(share) = share.filter(|share| *share < LEAST_LIT) {
+            viewer_light(scene, options.framed);
+            warnings.push(Warning(format!(
+                "what the file lets shine lights {:.0} % of what its camera sees, less than {:.0} %; {ADDED}",
+                100.0 * share,
+                100.0 * LEAST_LIT
+            )));
+        }
         return Ok(());
     }
     let strength_written = |number: &usize| {
@@ -107,10 +134,7 @@ pub(super) fn ensure_light(
         ));
     }
     viewer_light(scene, options.framed);
-    warnings.push(Warning(format!(
-        "the file has no light; it is lit by a directional light of {KEY_IRRADIANCE} W/m² from the viewer's upper left \
-         and a point light at the camera that gives {FILL_IRRADIANCE} W/m² at the middle of the scene"
-    )));
+    warnings.push(Warning(format!("the file has no light; {ADDED}")));
     Ok(())
 }
 
@@ -130,7 +154,7 @@ fn viewer_light(scene: &mut Scene, framed: Option<(DVec3, DVec3)>) {
         range: f32::INFINITY,
     });
     scene.lights.push(PunctualLight {
-        kind: LightKind::Point,
+        kind: LightKind::Eye,
         position: eye.as_vec3(),
         direction: camera.world_from_camera.transform_vector3(DVec3::NEG_Z).as_vec3(),
         intensity: Vec3::splat(FILL_IRRADIANCE * distance * distance),

@@ -2,12 +2,15 @@
 
 use super::animation::Pose;
 use super::document::{Document, called};
+use super::instances;
 use super::nodes::Nodes;
 use super::primitives::{Primitive, primitive_size, read_primitive};
 use crate::error::Result;
 use crate::scene::{Triangle, Warning};
 use glam::{DMat3, DMat4, DVec3, Vec2, Vec3};
 use gltf::json;
+use std::collections::HashSet;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Most triangles that a scene may have after all instances are unfolded: 1.6 GB in memory.
 pub const MAX_TRIANGLES: usize = 10_000_000;
@@ -24,6 +27,7 @@ struct LeftOut {
     degenerate: usize,
     points_and_lines: usize,
     incomplete: usize,
+    repeated: usize,
 }
 
 /// All triangles of the shown nodes in world space, and the materials that their `material` counts through.
@@ -37,7 +41,7 @@ pub(super) fn triangles(
     let mut decoded: Vec<Option<Vec<Primitive>>> = Vec::new();
     decoded.resize_with(document.root.meshes.len(), || None);
     let (mut triangles, mut used, mut left_out) = (Vec::new(), UsedMaterials::new(), LeftOut::default());
-    let mut instance = 0;
+    let (mut instance, mut met) = (0, HashSet::new());
     for &node in &nodes.shown {
         let Some(mesh) = document.root.nodes[node].mesh else { continue };
         let (meshed, number) = (document.get(mesh, "a node's mesh")?, mesh.value());
@@ -56,19 +60,26 @@ pub(super) fn triangles(
             decoded[number] = Some(primitives);
         }
         let skin = document.root.nodes[node].skin.map(|skin| joint_matrices(document, nodes, skin)).transpose()?;
-        for primitive in decoded[number].iter().flatten() {
-            let placement = Placement::new(nodes.world_from_node[node], skin.as_deref(), primitive);
+        let copies = instances::transforms(document, node)?;
+        for (primitive, copy) in decoded[number].iter().flatten().flat_map(|p| copies.iter().map(move |copy| (p, copy)))
+        {
+            let placement = Placement::new(nodes.world_from_node[node] * *copy, skin.as_deref(), primitive);
             let material = used.iter().position(|&m| m == primitive.material).unwrap_or_else(|| {
                 used.push(primitive.material);
                 used.len() - 1
             });
             let name = || document.node_name(node);
-            let before = triangles.len();
+            let (before, flat) = (triangles.len(), left_out.degenerate);
             for &corners in &primitive.triangles {
-                let triangle = placement.triangle(document, primitive, &pose.weights[node], corners, &name)?;
-                triangles.extend(triangle.map(|t| Triangle { material: material as u32, instance, ..t }));
+                let Some(found) = placement.triangle(document, primitive, &pose.weights[node], corners, &name)? else {
+                    left_out.degenerate += 1;
+                    continue;
+                };
+                if met.insert(place(&found, material)) {
+                    triangles.push(Triangle { material: material as u32, instance, ..found });
+                }
             }
-            left_out.degenerate += primitive.triangles.len() - (triangles.len() - before);
+            left_out.repeated += primitive.triangles.len() - (left_out.degenerate - flat) - (triangles.len() - before);
             instance += 1;
         }
     }
@@ -79,6 +90,20 @@ pub(super) fn triangles(
     Ok((triangles, used))
 }
 
+/// What tells a triangle's place and material from others': 128 bits of its corners' own, whichever comes first. Copies in one
+/// place show nothing more, and every ray would have to look at each.
+fn place(triangle: &Triangle, material: usize) -> u128 {
+    let corners = triangle.positions.map(|p| p.to_array().map(|x| (x + 0.0).to_bits()));
+    let first = (0..3).min_by_key(|&k| corners[k]).unwrap_or(0);
+    let turned: [[u32; 3]; 3] = std::array::from_fn(|k| corners[(first + k) % 3]);
+    let hash = |seed: u64| {
+        let mut hasher = DefaultHasher::new();
+        (seed, turned, material).hash(&mut hasher);
+        hasher.finish()
+    };
+    u128::from(hash(0)) << 64 | u128::from(hash(1))
+}
+
 fn warn(left_out: &LeftOut, warnings: &mut Vec<Warning>) {
     let mut tell = |count: usize, what: &str| {
         if count > 0 {
@@ -86,6 +111,7 @@ fn warn(left_out: &LeftOut, warnings: &mut Vec<Warning>) {
         }
     };
     tell(left_out.degenerate, "triangles without area are left out");
+    tell(left_out.repeated, "triangles stand exactly on others of the same material and are left out");
     tell(left_out.points_and_lines, "primitives are points or lines, which have no surface, and are left out");
     tell(left_out.incomplete, "primitives end in an incomplete triangle, which is left out");
 }
@@ -96,9 +122,10 @@ fn check_size(document: &Document, nodes: &Nodes) -> Result<()> {
     let mut counted = vec![false; document.root.meshes.len()];
     for &node in &nodes.shown {
         let Some(mesh) = document.root.nodes[node].mesh else { continue };
+        let copies = instances::count(document, node)?;
         for primitive in &document.get(mesh, "a node's mesh")?.primitives {
             let size = primitive_size(document, primitive)?;
-            triangles = triangles.saturating_add(size.triangles);
+            triangles = triangles.saturating_add(size.triangles.saturating_mul(copies));
             vertices = vertices.saturating_add(if counted[mesh.value()] { 0 } else { size.vertices });
         }
         counted[mesh.value()] = true;

@@ -19,8 +19,8 @@
 //! `.gltf` and `.glb`; buffers and images in the file, in data URIs or in files beside it; node trees with matrices,
 //! mirrored and shared meshes; triangles, strips and fans, with or without indices; sparse accessors; normals, two sets
 //! of texture coordinates, vertex colours; skins and morph targets, posed by an animation clip at a time; cameras;
-//! PNG and JPEG textures with sampler and transform; metallic-roughness materials; the extensions
-//! [`UNDERSTOOD_EXTENSIONS`]. Points and lines have no surface: they are left out with a warning.
+//! PNG, JPEG, WebP and KTX2 textures (plain ones, and with the feature `basisu` Basis Universal) with sampler and transform; metallic-roughness materials; the extensions
+//! [`UNDERSTOOD_EXTENSIONS`]; geometry packed by Draco and meshopt. OBJ with its MTL, and STL, are told as glTF first. Points and lines have no surface: they are left out with a warning.
 //!
 //! # Assumptions, each with a warning
 //!
@@ -34,16 +34,22 @@
 mod accessor;
 mod animation;
 mod cameras;
+mod converted;
 mod document;
 mod images;
+mod instances;
 mod ktx2;
 mod lights;
 mod materials;
 mod meshes;
 mod nodes;
+mod own_light;
+mod packed;
 mod primitives;
 mod resources;
+mod rewritten;
 
+pub use converted::is_scene;
 pub use document::UNDERSTOOD_EXTENSIONS;
 pub use images::{MAX_TEXELS, MAX_TEXTURE_SIDE};
 pub use meshes::{MAX_COORDINATE, MAX_TRIANGLES};
@@ -102,6 +108,8 @@ pub struct LoadOptions {
     /// A file without a camera or a light is given one that suits this box (low, high) [m]. `None`: the box of the scene
     /// as it is posed. An animation that one camera is to see gives the box of all its poses.
     pub framed: Option<(DVec3, DVec3)>,
+    /// Whether the file's URIs may point to files outside of its folder.
+    pub allow_outside: bool,
 }
 
 /// A scene and what had to be assumed to make it.
@@ -117,8 +125,10 @@ pub struct Loaded {
 ///
 /// A file that lights nothing (no emission, no punctual light, not everything unlit) is lit by a directional light of
 /// irradiance 2.2 W/m² from the viewer's upper left and by a point light at the first camera that gives 0.8 W/m² at the
-/// middle of the scene, so that a white surface square to both has a radiance of about 1 W/(m² sr). The same light is
-/// added to the file's own on request: a lamp that shines away from the viewer is else a dark shape.
+/// middle of the scene, so that a white surface square to both has a radiance of about 1 W/(m² sr). The light at the camera
+/// reaches all that the camera sees, through the backs of one-sided walls too. The same light is added to the file's own
+/// where that is emission alone and lights less than a quarter of what the camera sees (a glowing label on a dark model),
+/// and on request: a lamp that shines away from the viewer is else a dark shape.
 ///
 /// # Errors
 ///
@@ -126,7 +136,7 @@ pub struct Loaded {
 /// passes a limit, or has lights that all have no intensity; [`Error::Parameter`] for a camera, scene, clip or time
 /// that the file does not have.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
-    File::open(path)?.pose(options)
+    File::open_with(path, options)?.pose(options)
 }
 
 /// A file that was read once and is posed at several times: its buffers are kept, and its textures once decoded.
@@ -134,6 +144,8 @@ pub struct File {
     document: Document,
     warnings: Vec<Warning>,
     decoded: Option<Decoded>,
+    /// What share of the view the file's own emission lights, once it was looked at.
+    lit: Option<Option<f64>>,
 }
 
 /// Materials for the triangles of one pose, and what there was to say about them.
@@ -145,15 +157,24 @@ struct Decoded {
 }
 
 impl File {
-    /// Reads the file and its buffers.
+    /// Reads the file and its buffers, none outside of its folder.
     ///
     /// # Errors
     ///
     /// As [`load`], as far as no pose is needed to see it.
     pub fn open(path: &Path) -> Result<Self> {
+        Self::open_with(path, &LoadOptions::default())
+    }
+
+    /// As [`File::open`], with buffers outside of its folder where `options` allow them.
+    ///
+    /// # Errors
+    ///
+    /// As [`File::open`].
+    pub fn open_with(path: &Path, options: &LoadOptions) -> Result<Self> {
         let mut warnings = Vec::new();
-        let document = Document::open(path, &mut warnings)?;
-        Ok(Self { document, warnings, decoded: None })
+        let document = Document::open(path, options.allow_outside, &mut warnings)?;
+        Ok(Self { document, warnings, decoded: None, lit: None })
     }
 
     /// The scene in the pose that `options` name.
@@ -186,7 +207,7 @@ impl File {
         let lights = lights::read(document, &nodes)?;
 
         let mut scene = Scene { triangles, materials, textures, lights, cameras };
-        lights::ensure_light(document, &mut scene, &decoded.used, options, &mut warnings)?;
+        lights::ensure_light(document, &mut scene, &decoded.used, options, &mut self.lit, &mut warnings)?;
         self.decoded = Some(decoded);
         Ok(Loaded { scene: Arc::new(scene), warnings })
     }

@@ -50,9 +50,21 @@ impl Nodes {
             // A file without scenes is a library of parts; all of it is shown.
             None => roots(),
         };
-        let shown = depth_first(nodes, tops).map_err(twice)?;
+        let mut shown = depth_first(nodes, tops).map_err(twice)?;
+        // What hangs on a hidden node is hidden with it; parents stand before their children.
+        let mut hidden = vec![false; nodes.len()];
+        for &node in &shown {
+            hidden[node] = is_hidden(&nodes[node]) || parents[node].is_some_and(|parent| hidden[parent]);
+        }
+        shown.retain(|&node| !hidden[node]);
         Ok(Self { world_from_node, shown })
     }
+}
+
+/// Whether KHR_node_visibility hides a node.
+fn is_hidden(node: &json::Node) -> bool {
+    let own = node.extensions.as_ref().and_then(|e| e.others.get("KHR_node_visibility"));
+    own.and_then(|own| own.get("visible")?.as_bool()) == Some(false)
 }
 
 fn parents(document: &Document) -> Result<Vec<Option<usize>>> {
