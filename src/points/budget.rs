@@ -7,7 +7,8 @@
 //! - the *panel* separates spots of max(p, λ|z|/D) at depth z, with its pitch p and extent D: λ/(2 sin θ) with either the
 //!   whole cone sin θ = λ/2p of a pixel or, far from the panel, the cone of the whole panel.
 
-use super::placement::{Phase, Placing, place};
+use super::placed::place;
+use super::placement::{Phase, Placing};
 use super::trace::{TraceSettings, Traced, trace};
 use crate::error::{Error, Result};
 use crate::field::Grid;

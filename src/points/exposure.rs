@@ -77,6 +77,11 @@ impl Exposure {
         }
     }
 
+    /// Whether both are sub-frames of one picture.
+    pub fn is_shown_with(&self, other: &Self) -> bool {
+        matches!([self.share, other.share], [Share::SubFrame { .. }, Share::SubFrame { .. }])
+    }
+
     /// What the lasers' gamut does to a cloud; `None` for one laser.
     pub fn gamut(exposures: &[Self], cloud: &PointCloud) -> Option<Gamut> {
         exposures.iter().find_map(|exposure| match exposure.share {

@@ -7,14 +7,14 @@
 use super::settings::{MirrorDepth, TraceSettings};
 use super::wavefront::{Wavefront, normal_change};
 use crate::illumination::paths::{Ways, inside};
-use crate::illumination::{Illumination, Surface};
+use crate::illumination::{DiffuseLight, Illumination, Surface};
 use crate::random::Random;
-use crate::scene::bvh::{Ray, Sides};
+use crate::scene::bvh::{Ray, SceneBvh, Sides};
 use crate::scene::{Camera, Projection};
 use glam::{DVec3, Vec3};
 
 /// Rays into the lobe of a rough surface that reflects everything; fewer where it reflects less.
-const LOBE_RAYS: f32 = 16.0;
+pub(crate) const LOBE_RAYS: f32 = 16.0;
 /// Ways that bring less than this part of a white surface's light are followed by chance.
 const FAINT: f32 = 0.01;
 /// Ways followed at once; further ones are chosen from by chance.
@@ -58,16 +58,71 @@ impl RaySample {
     pub(crate) fn nothing() -> Self {
         Self { radiance: Vec3::ZERO, depth: 0.0, bounces: 0, first: u32::MAX, normal: DVec3::ZERO, ends: Vec::new() }
     }
+
+    fn clear(&mut self) {
+        let mut ends = std::mem::take(&mut self.ends);
+        ends.clear();
+        *self = Self { ends, ..Self::nothing() };
+    }
+
+    /// Puts the ends that belong together into one each, and takes depth and mirrors of the strongest.
+    pub(crate) fn gather(&mut self) {
+        self.ends = gathered(std::mem::take(&mut self.ends));
+        if let Some(strongest) = self.ends.first() {
+            self.depth = strongest.depth;
+            self.bounces = strongest.bounces;
+        }
+    }
 }
 
-/// An eye before a lit scene.
+impl Default for RaySample {
+    fn default() -> Self {
+        Self::nothing()
+    }
+}
+
+/// A camera's eye before a lit scene.
 pub(crate) struct Eye<'a> {
-    light: &'a Illumination,
     camera: &'a Camera,
     settings: &'a TraceSettings,
     aspect: f64,
-    /// Width of a pixel at one metre, or anywhere in an orthographic picture [m].
-    pixel: f64,
+    looks: Looks<'a, Illumination>,
+}
+
+/// How the rays of an eye are followed, whoever sends them.
+pub(crate) struct Looks<'a, L> {
+    /// What shines on the surfaces.
+    pub(crate) light: &'a L,
+    /// The surfaces.
+    pub(crate) bvh: &'a SceneBvh,
+    /// How wide a pixel is.
+    pub(crate) footprint: Footprint,
+    /// Most mirrors or glass surfaces on one ray.
+    pub(crate) bounces: u32,
+    /// Where points stand that are seen by way of optics.
+    pub(crate) mirror_depth: MirrorDepth,
+    /// Rays into the lobe of a rough surface that reflects everything, [`LOBE_RAYS`] unless many looks are averaged.
+    pub(crate) lobe_rays: f32,
+}
+
+/// Width of a pixel along its ray: `start` + `growth` · distance [m].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Footprint {
+    pub(crate) start: f64,
+    pub(crate) growth: f64,
+}
+
+impl Footprint {
+    fn at(self, distance: f64) -> f64 {
+        self.start + self.growth * distance
+    }
+}
+
+/// What a look has found, and the ways that are still open: kept from look to look to spare their memory.
+#[derive(Default)]
+pub(crate) struct Found {
+    pub(crate) seen: RaySample,
+    open: Vec<Branch>,
 }
 
 /// A ray on its way.
@@ -80,7 +135,8 @@ struct Branch {
     bounces: u32,
     /// Geometric normal of the surface that it leaves.
     leaving: Option<DVec3>,
-    wave: Wavefront,
+    /// Followed where it tells the depth.
+    wave: Option<Wavefront>,
     group: Option<u16>,
     /// Over how many looks like this the mean is taken.
     share: u32,
@@ -91,7 +147,14 @@ impl<'a> Eye<'a> {
     pub(crate) fn new(light: &'a Illumination, camera: &'a Camera, settings: &'a TraceSettings) -> Self {
         let aspect = f64::from(settings.width) / f64::from(settings.height);
         let (_, half_height) = camera.half_size(aspect);
-        Self { light, camera, settings, aspect, pixel: 2.0 * half_height / f64::from(settings.height) }
+        let pixel = 2.0 * half_height / f64::from(settings.height);
+        let footprint = match camera.projection {
+            Projection::Perspective { .. } => Footprint { start: 0.0, growth: pixel },
+            Projection::Orthographic { .. } => Footprint { start: pixel, growth: 0.0 },
+        };
+        let (bounces, mirror_depth) = (settings.bounces, settings.mirror_depth);
+        let looks = Looks { light, bvh: light.bvh(), footprint, bounces, mirror_depth, lobe_rays: LOBE_RAYS };
+        Self { camera, settings, aspect, looks }
     }
 
     /// The ray through a place of the picture, in pixels.
@@ -100,43 +163,39 @@ impl<'a> Eye<'a> {
         self.camera.ray(u, v, self.aspect)
     }
 
-    /// Width of a pixel at a distance along its ray [m].
-    fn footprint(&self, distance: f64) -> f64 {
-        match self.camera.projection {
-            Projection::Perspective { .. } => self.pixel * distance,
-            Projection::Orthographic { .. } => self.pixel,
-        }
-    }
-
     /// Follows the ray through a place of the picture.
     ///
     /// `share` is the number of looks whose mean is taken.
     pub(crate) fn look(&self, column: f64, row: f64, share: u32, random: &mut Random) -> RaySample {
-        let ray = self.ray(column, row);
-        let mut seen = RaySample::nothing();
-        let mut ends: Vec<PathEnd> = Vec::new();
+        let mut found = Found::default();
+        self.looks.follow(self.ray(column, row), share, &mut found, random);
+        found.seen.gather();
+        found.seen
+    }
+}
+
+impl<L: DiffuseLight> Looks<'_, L> {
+    /// Follows a ray by all its ways; what it sees is in `found`, its ends as they come ([`RaySample::gather`]).
+    ///
+    /// `share` is the number of looks whose mean is taken.
+    pub(crate) fn follow(&self, ray: Ray, share: u32, found: &mut Found, random: &mut Random) {
+        let Found { seen, open } = found;
+        seen.clear();
         let mut groups = 0u16;
-        let first = Branch {
+        open.push(Branch {
             ray,
             weight: Vec3::ONE,
             path: 0.0,
             first: 0.0,
             bounces: 0,
             leaving: None,
-            wave: Wavefront::new(ray.direction),
+            wave: (self.mirror_depth == MirrorDepth::Focus).then(|| Wavefront::new(ray.direction)),
             group: None,
             share,
-        };
-        let mut open = vec![first];
+        });
         while let Some(branch) = open.pop() {
-            self.step(branch, &mut seen, &mut ends, &mut open, &mut groups, random);
+            self.step(branch, seen, open, &mut groups, random);
         }
-        seen.ends = gathered(ends);
-        if let Some(strongest) = seen.ends.first() {
-            seen.depth = strongest.depth;
-            seen.bounces = strongest.bounces;
-        }
-        seen
     }
 
     /// Takes a branch to its next surface.
@@ -144,12 +203,11 @@ impl<'a> Eye<'a> {
         &self,
         mut branch: Branch,
         seen: &mut RaySample,
-        ends: &mut Vec<PathEnd>,
         open: &mut Vec<Branch>,
         groups: &mut u16,
         random: &mut Random,
     ) {
-        let bvh = self.light.bvh();
+        let bvh = self.bvh;
         let ray = branch.ray;
         let hit = match branch.leaving {
             None => bvh.nearest(&ray, 0.0, Sides::Front),
@@ -160,12 +218,15 @@ impl<'a> Eye<'a> {
         if branch.bounces == 0 {
             branch.first = branch.path;
         }
-        let surface = Surface::at(bvh.scene(), &hit, self.footprint(branch.path));
+        let footprint = self.footprint.at(branch.path);
+        let surface = Surface::at(bvh.scene(), &hit, footprint);
         if branch.bounces == 0 && branch.leaving.is_none() {
             seen.first = hit.triangle;
             seen.normal = surface.normal;
         }
-        branch.wave.advance(ray.direction, hit.distance, surface.normal);
+        if let Some(wave) = &mut branch.wave {
+            wave.advance(ray.direction, hit.distance, surface.normal);
+        }
         branch.weight *= inside(bvh.scene().material(hit.triangle), &hit, hit.distance);
         let own = |weight: Vec3, ray: Ray| Branch { ray, weight, leaving: Some(surface.facing), ..branch };
         if surface.coverage < 1.0 {
@@ -175,14 +236,15 @@ impl<'a> Eye<'a> {
             branch.weight *= surface.coverage;
         }
         if surface.is_diffuse() || surface.emission.max_element() > 0.0 {
-            let radiance = branch.weight * self.light.radiance(&hit, &surface, branch.share, random);
+            let shown = self.light.shown(&hit, &surface, footprint, branch.share, random);
+            let radiance = branch.weight * shown;
             let group = branch.group.unwrap_or_else(|| next(groups));
             let depth = self.depth(&branch);
             seen.radiance += radiance;
-            ends.push(PathEnd { radiance, depth, bounces: branch.bounces.min(255) as u8, group });
+            seen.ends.push(PathEnd { radiance, depth, bounces: branch.bounces.min(255) as u8, group });
         }
         let bends = surface.is_specular() || surface.transmission.max_element() > 0.0;
-        if surface.unlit || !bends || branch.bounces >= self.settings.bounces {
+        if surface.unlit || !bends || branch.bounces >= self.bounces {
             return;
         }
         // One look tells how strong the ways are; for a rough surface each ray of its lobe looks again.
@@ -194,7 +256,8 @@ impl<'a> Eye<'a> {
         let lobe = if surface.is_sharp() || branch.group.is_some() {
             1
         } else {
-            (LOBE_RAYS * strength * branch.weight.max_element().min(1.0)).ceil().clamp(1.0, LOBE_RAYS) as u32
+            let most = self.lobe_rays;
+            (most * strength * branch.weight.max_element().min(1.0)).ceil().clamp(1.0, most) as u32
         };
         let groups: [Option<u16>; 2] = match (branch.group, surface.is_sharp()) {
             (None, false) => [Some(next(groups)), Some(next(groups))],
@@ -212,11 +275,13 @@ impl<'a> Eye<'a> {
                 ..own(branch.weight / lobe as f32 * part, Ray { origin: surface.position, direction })
             };
             let mut mirrored = onward(ways.reflectance, ways.mirrored, groups[0]);
-            mirrored.wave.reflect(ray.direction, ways.half, &change);
+            if let Some(wave) = &mut mirrored.wave {
+                wave.reflect(ray.direction, ways.half, &change);
+            }
             push(open, mirrored, random);
             let mut through = onward(ways.transmittance, ways.through, groups[1]);
-            if surface.volume {
-                through.wave.refract(ray.direction, ways.half, ways.ratio, &change);
+            if let Some(wave) = through.wave.as_mut().filter(|_| surface.volume) {
+                wave.refract(ray.direction, ways.half, ways.ratio, &change);
             }
             push(open, through, random);
         }
@@ -224,10 +289,8 @@ impl<'a> Eye<'a> {
 
     /// Where along the eye's ray light of a finished branch seems to come from [m].
     fn depth(&self, branch: &Branch) -> f64 {
-        if self.settings.mirror_depth == MirrorDepth::Path || branch.bounces == 0 {
-            return branch.path;
-        }
-        let vergence = branch.wave.vergence(branch.ray.direction);
+        let Some(wave) = branch.wave.as_ref().filter(|_| branch.bounces > 0) else { return branch.path };
+        let vergence = wave.vergence(branch.ray.direction);
         let (nearest, farthest) = (NEAREST * branch.first, FARTHEST * branch.path);
         if vergence.is_nan() { branch.path } else { 1.0 / vergence.clamp(1.0 / farthest, 1.0 / nearest) }
     }

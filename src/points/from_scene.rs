@@ -177,6 +177,7 @@ impl LitScene {
         }
         let mut world = traced.world_points();
         let white = settings.white.apply(&mut world, &traced.picture)?;
+        let placing = placing.fixed_by(&world);
         let placed = place(&world, &placing, settings.phase, panel, wavelength);
         let view = SceneView::new(&traced, &placed, placing);
         let warnings = self.loaded.warnings.iter().map(ToString::to_string).collect();

@@ -1,32 +1,17 @@
 //! Points from a picture and its depth map, as renderers and depth cameras give them.
 
+pub use super::depth_map::DepthScale;
+use super::depth_map::{DepthMap, DepthReading, open};
 use super::placement::Placement;
 use super::{PointCloud, PointSource, luminance};
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::files;
-use crate::names::{Name, Named};
 use crate::random::Random;
 use crate::scene::texture::linear_from_srgb;
 use glam::DVec3;
-use image::{ImageBuffer, Luma, Rgb};
+use image::{ImageBuffer, Rgb};
 use std::path::Path;
-
-/// Which end of the depth map's gray scale is near.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum DepthScale {
-    /// White is near, black is far (OpenHolo, tensor holography).
-    #[default]
-    WhiteNear,
-    /// Black is near, white is far.
-    BlackNear,
-}
-
-impl Named for DepthScale {
-    const KIND: &'static str = "depth scale";
-    const NAMES: &'static [Name<Self>] =
-        &[("white-near", || Self::WhiteNear, "white is near"), ("black-near", || Self::BlackNear, "black is near")];
-}
 
 /// The viewing window that a picture fills: the panel as seen from the eye.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,57 +53,41 @@ pub type Picture16 = ImageBuffer<Rgb<u16>, Vec<u16>>;
 #[derive(Clone, Debug)]
 pub struct RgbDepth {
     pub(super) picture: Picture16,
-    /// Gray, of the same size.
-    pub(super) depths: ImageBuffer<Luma<u16>, Vec<u16>>,
-    pub(super) scale: DepthScale,
-    /// Depth z of the gray scale's near and far end [m].
+    /// Of the same size.
+    pub map: DepthMap,
+    /// Depth z of the map's near and far end [m].
     pub(super) ends: [f64; 2],
 }
 
-/// Opens a picture.
-pub(super) fn open(path: &Path) -> Result<image::DynamicImage> {
-    if !path.is_file() {
-        let missing = std::io::Error::from(std::io::ErrorKind::NotFound);
-        return Err(Error::Io { path: path.into(), source: missing });
-    }
-    image::open(path).map_err(|e| Error::input(path, format!("not a picture that can be read: {e}")))
-}
-
 impl RgbDepth {
-    /// Reads `rgb` (sRGB-coded, 8 or 16 bit) and `depth` (gray, 8 or 16 bit, same size).
+    /// Reads `rgb` (sRGB-coded, 8 or 16 bit) and its depth map of the same size.
     ///
     /// # Errors
-    /// [`Error::Input`] for files that are not pictures or differ in size; [`Error::Parameter`] for a model placement.
-    pub fn read(rgb: &Path, depth: &Path, scale: DepthScale, placement: &Placement) -> Result<Self> {
+    /// [`Error::Input`] for files that are not pictures or differ in size; [`Error::Parameter`] for a model placement; as
+    /// [`DepthMap::read`].
+    pub fn read(rgb: &Path, depth: &Path, reading: &DepthReading, placement: &Placement) -> Result<Self> {
         let Placement::Window { near, far, .. } = *placement else {
             let what = "a picture with depth has no scene to make a model of; use window";
             return Err(Error::parameter("placement", what));
         };
         let picture = open(rgb)?.into_rgb16();
-        let depths = open(depth)?.into_luma16();
-        if picture.dimensions() != depths.dimensions() {
-            let ((w, h), (dw, dh)) = (picture.dimensions(), depths.dimensions());
-            let what = format!("{dw}×{dh} pixels, but {} has {w}×{h}; they must be equal", rgb.display());
-            return Err(Error::input(depth, what));
-        }
-        Ok(Self { picture, depths, scale, ends: [near, far] })
+        let map = DepthMap::read(depth, reading)?.on(depth, picture.dimensions().into())?;
+        Ok(Self { picture, map, ends: [near, far] })
     }
     /// Columns and rows.
     pub fn size(&self) -> [u32; 2] {
         [self.picture.width(), self.picture.height()]
     }
-    /// Depth z of every pixel, row by row [m].
-    pub(super) fn depths(&self) -> impl Iterator<Item = f64> + '_ {
-        self.depths.pixels().map(|gray| self.z(gray.0[0]))
+    /// Depth z of every pixel, row by row [m]; none where nothing was measured.
+    pub(super) fn depths(&self) -> impl Iterator<Item = Option<f64>> + '_ {
+        self.map.parts.iter().map(|part| self.z(*part))
     }
-    /// Depth z of a pixel [m].
-    pub(super) fn depth(&self, column: u32, row: u32) -> f64 {
-        self.z(self.depths.get_pixel(column, row).0[0])
+    /// Depth z of a pixel [m], where it was measured.
+    pub(super) fn depth(&self, column: u32, row: u32) -> Option<f64> {
+        self.z(self.map.parts[(row * self.map.width + column) as usize])
     }
-    fn z(&self, gray: u16) -> f64 {
-        let gray = f64::from(gray) / 65535.0;
-        let part = if self.scale == DepthScale::WhiteNear { 1.0 - gray } else { gray };
-        self.ends[0] + part * (self.ends[1] - self.ends[0])
+    fn z(&self, part: f32) -> Option<f64> {
+        (!part.is_nan()).then(|| self.ends[0] + f64::from(part) * (self.ends[1] - self.ends[0]))
     }
 }
 
@@ -157,22 +126,14 @@ pub fn write_depths(
     })
 }
 
-/// Reads a picture and its depth map into points.
+/// Points of a picture and its depth map.
 ///
-/// The picture fills the viewing window of a [`Placement::Window`]; depth runs linearly in gray between its `near` and
-/// `far`. Black pixels make no point. Phases are random under `seed`, or all zero without one.
+/// The picture fills the viewing window of a [`Placement::Window`]; depth runs linearly between its `near` and `far`. Black
+/// pixels, and those without measurement, make no point. Phases are random under `seed`, or all zero without one.
 ///
 /// # Errors
-/// Those of [`RgbDepth::read`] and [`PictureWindow::new`]; [`Error::Input`] for a picture that is black.
-pub fn read(
-    rgb: &Path,
-    depth: &Path,
-    scale: DepthScale,
-    placement: &Placement,
-    seed: Option<u64>,
-    panel: &Grid,
-) -> Result<PointCloud> {
-    let read = RgbDepth::read(rgb, depth, scale, placement)?;
+/// Those of [`PictureWindow::new`]; [`Error::Parameter`] for a picture that is black wherever a depth was measured.
+pub fn points(read: &RgbDepth, placement: &Placement, seed: Option<u64>, panel: &Grid) -> Result<PointCloud> {
     let window = PictureWindow::new(placement, read.size(), panel)?;
     let [width, height] = read.size().map(f64::from);
     let mut cloud = PointCloud { points: Vec::new(), rgb: Some(Vec::new()) };
@@ -182,6 +143,7 @@ pub fn read(
         if radiance == [0.0; 3] {
             continue;
         }
+        let Some(z) = z else { continue };
         let (column, row) = (pixel as u32 % read.size()[0], pixel as u32 / read.size()[0]);
         let spread = window.spread(z);
         let x = ((f64::from(column) + 0.5) / width * 2.0 - 1.0) * window.half[0] * spread;
@@ -194,7 +156,7 @@ pub fn read(
         amplitudes.push(radiance.map(amplitude));
     }
     if cloud.points.is_empty() {
-        return Err(Error::input(rgb, "is black everywhere, so it makes no points"));
+        return Err(Error::parameter("picture", "is black wherever a depth is known, so it makes no points"));
     }
     Ok(cloud)
 }
@@ -216,7 +178,9 @@ mod tests {
         gray.save(&depth).expect("depth");
         let panel = Grid::new(1920, 1080, 8e-6, 8e-6).expect("panel");
         let placement = Placement::Window { eye: 0.5, near: 0.01, far: -0.2 };
-        let cloud = read(&rgb, &depth, DepthScale::WhiteNear, &placement, None, &panel).expect("cloud");
+        let read = |reading: DepthReading| RgbDepth::read(&rgb, &depth, &reading, &placement);
+        let both = read(DepthReading::default()).expect("picture");
+        let cloud = points(&both, &placement, None, &panel).expect("cloud");
         assert_eq!(cloud.points.len(), 2);
         let (a, b) = (cloud.points[0].position, cloud.points[1].position);
         assert!((a.z - 0.01).abs() < 1e-12 && a.x < 0.0 && a.y > 0.0, "{a}");
@@ -227,7 +191,7 @@ mod tests {
         assert!(rgb_amplitudes[1][0] > 0.0 && rgb_amplitudes[1][1] == 0.0);
         gray = image::GrayImage::new(5, 2);
         gray.save(&depth).expect("depth");
-        let refused = read(&rgb, &depth, DepthScale::WhiteNear, &placement, None, &panel).unwrap_err().to_string();
+        let refused = read(DepthReading::default()).unwrap_err().to_string();
         assert!(refused.contains("5×2"), "{refused}");
     }
 }

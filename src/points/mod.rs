@@ -23,19 +23,25 @@
 //! ```
 
 pub mod budget;
+pub mod clouds;
 pub mod colour;
+pub mod depth_map;
 pub mod exposure;
-mod eye;
+pub(crate) mod eye;
 #[cfg(test)]
 mod eye_tests;
 mod from_scene;
+mod gather;
 pub mod images;
 #[cfg(test)]
 mod odd_tests;
+mod placed;
 pub mod placement;
 #[cfg(test)]
 mod placement_tests;
+mod placing_cloud;
 pub mod ply;
+mod reach;
 mod settings;
 pub mod slices;
 mod subframes;
@@ -46,7 +52,10 @@ pub(crate) mod white;
 
 pub use exposure::{Exposure, Share};
 pub use from_scene::{LitScene, ScenePoints, SceneSettings};
-pub use placement::{Placed, Placement, place};
+pub use placed::{Placed, place};
+pub use placement::Placement;
+pub use placing_cloud::PlacedCloud;
+pub use reach::Reach;
 pub use subframes::{Multiplexing, SubFrames};
 pub use trace::{TraceSettings, Traced, TracedPoint, trace};
 pub use view::SceneView;

@@ -6,11 +6,11 @@
 //!
 //! *Model*: a similarity transform; the scene is a miniature behind the panel, true for every view.
 
-use super::{Channel, PointCloud, PointSource};
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::names::{Name, Named};
 use crate::random::Random;
+use crate::scene::bvh::Ray;
 use crate::scene::{Camera, Projection, Scene};
 use glam::{DMat3, DMat4, DVec2, DVec3};
 
@@ -45,6 +45,16 @@ impl Default for Placement {
     }
 }
 
+impl Placement {
+    /// The same, nearer to the viewer by `by` [m].
+    pub fn nearer(self, by: f64) -> Self {
+        match self {
+            Self::Window { eye, near, far } => Self::Window { eye, near: near + by, far: far + by },
+            Self::Model { eye, z, scale } => Self::Model { eye, z: z + by, scale },
+        }
+    }
+}
+
 /// Initial phase of the point sources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
@@ -57,6 +67,24 @@ pub enum Phase {
     },
     /// −k × (distance from the eye): all waves reach the eye in step.
     Path,
+}
+
+impl Phase {
+    /// The phase of point number `index` at a distance from the eye [m], for a vacuum wavelength [m] [rad].
+    pub fn of(self, index: usize, distance: f64, wavelength: f64) -> f64 {
+        match self {
+            Self::Zero => 0.0,
+            Self::Random { seed } => Random::new(seed, index as u64).phase(),
+            Self::Path => path_phase(distance, wavelength),
+        }
+    }
+}
+
+/// −k·distance, reduced to 0 … 2π [rad], for a vacuum wavelength [m]: the phase with which a wave from that distance [m]
+/// arrives in step.
+pub(super) fn path_phase(distance: f64, wavelength: f64) -> f64 {
+    let turns = -distance / wavelength;
+    std::f64::consts::TAU * (turns - turns.floor())
 }
 
 impl Named for Phase {
@@ -101,6 +129,114 @@ struct DepthMap {
     held: Option<[f64; 2]>,
 }
 
+/// The definite map of depth: reach(z) = reach(near) + slope·(s(w) − s(nearest)) for camera depth w, with s = 1/w and
+/// reach = 1/(E − z) before a perspective camera (exact at both ends of the depth range), s = w and reach = z before an
+/// orthographic one.
+#[derive(Clone, Copy, Debug)]
+struct DepthScale {
+    perspective: bool,
+    eye: f64,
+    near: f64,
+    far: f64,
+    nearest: f64,
+    farthest: f64,
+    slope: f64,
+}
+
+impl DepthMap {
+    fn scale(&self, placing: &Placing, [nearest, farthest]: [f64; 2]) -> DepthScale {
+        let perspective = matches!(placing.camera.projection, Projection::Perspective { .. });
+        let (near, far) = (self.near, self.far);
+        let mut scale = DepthScale { perspective, eye: placing.eye.z, near, far, nearest, farthest, slope: 0.0 };
+        let (near_s, far_s) = (scale.s(nearest), scale.s(farthest));
+        if near_s != far_s {
+            scale.slope = (scale.reach(near) - scale.reach(far)) / (near_s - far_s);
+        }
+        scale
+    }
+}
+
+impl DepthScale {
+    fn s(&self, w: f64) -> f64 {
+        if self.perspective { 1.0 / w } else { w }
+    }
+
+    fn reach(&self, z: f64) -> f64 {
+        if self.perspective { 1.0 / (self.eye - z) } else { z }
+    }
+
+    /// Depth z of a camera depth.
+    fn z(&self, w: f64) -> f64 {
+        // Beyond depths that are held a point stands on the nearest or farthest plane.
+        let value =
+            self.reach(self.near) + self.slope * (self.s(w.clamp(self.nearest, self.farthest)) - self.s(self.nearest));
+        if self.perspective { self.eye - 1.0 / value } else { value }
+    }
+
+    fn hologram_from_camera(&self, placing: &Placing, p: DVec3) -> DVec3 {
+        let (half_width, half_height) = placing.camera.half_size(placing.aspect);
+        let w = -p.z;
+        let z = self.z(w);
+        let (x, y) = if self.perspective { (p.x / w, p.y / w) } else { (p.x, p.y) };
+        let spread = (self.eye - z) / self.eye;
+        DVec3::new(x / half_width * placing.window.x * spread, y / half_height * placing.window.y * spread, z)
+    }
+
+    /// Two points in camera space of a line of sight, `at` a depth z in the hologram frame, of an eye at depth `eye`: where it
+    /// begins, and one before it.
+    fn line(&self, placing: &Placing, at: impl Fn(f64) -> DVec3, eye: f64) -> (DVec3, DVec3) {
+        let half_size: DVec2 = placing.camera.half_size(placing.aspect).into();
+        // Camera metres (or their ratios) over hologram metres on the panel's plane.
+        let scale = half_size / placing.window;
+        let lateral = |p: DVec3| p.truncate() * scale * self.eye;
+        if !self.perspective {
+            let point = |z: f64, w: f64| (lateral(at(z)) / (self.eye - z)).extend(-w);
+            let (near, far) = (point(self.near, self.nearest), point(self.far, self.farthest));
+            if self.slope == 0.0 {
+                return (near.truncate().extend(0.0), near.truncate().extend(-1.0));
+            }
+            let start = near + (far - near) * (-self.nearest / (self.farthest - self.nearest));
+            return (start, far);
+        }
+        if self.slope == 0.0 {
+            return (DVec3::ZERO, (lateral(at(self.near)) / (self.eye - self.near)).extend(-1.0));
+        }
+        // From 1/(E − z) = α + β/w: w = β·(E − z)/(1 − α·(E − z)), which is finite at the eye's own plane.
+        let beta = self.slope;
+        let alpha = self.reach(self.near) - beta / self.nearest;
+        let point = |z: f64| {
+            let reach = self.eye - z;
+            let share = beta / (1.0 - alpha * reach);
+            (lateral(at(z)) * share).extend(-reach * share)
+        };
+        // What stands behind the camera is not seen from farther off either.
+        (point(eye.min(self.eye)), point(self.far))
+    }
+}
+
+/// Least and greatest of depths.
+fn range(depths: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
+    [depths.clone().fold(f64::INFINITY, f64::min), depths.fold(f64::NEG_INFINITY, f64::max)]
+}
+
+/// The rays of one eye point in the world ([`Placing::rays`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EyeRays {
+    /// Where the ray through the panel's middle begins, and by how much that moves for a metre along x and y [m].
+    from: [DVec3; 3],
+    /// The same for a second point on it.
+    to: [DVec3; 3],
+}
+
+impl EyeRays {
+    /// The ray through a point of the panel's plane [m].
+    pub fn through(&self, on_panel: DVec2) -> Ray {
+        let at = |[middle, x, y]: [DVec3; 3]| middle + x * on_panel.x + y * on_panel.y;
+        let from = at(self.from);
+        Ray { origin: from, direction: (at(self.to) - from).normalize() }
+    }
+}
+
 #[derive(Clone, Debug)]
 enum Map {
     Window(DepthMap),
@@ -114,17 +250,6 @@ pub struct WorldPoint {
     pub position: DVec3,
     /// Linear RGB radiance.
     pub radiance: [f32; 3],
-}
-
-/// Points in the hologram frame with what the panel can do with them.
-#[derive(Clone, Debug, Default)]
-pub struct Placed {
-    /// The points, coloured, in the order of the world points.
-    pub cloud: PointCloud,
-    /// Points whose light the panel cannot send to the eye: sin of the angle beyond λ/2p.
-    pub beyond_cone: usize,
-    /// Their part of the light (0 to 1).
-    pub beyond_cone_light: f64,
 }
 
 impl Placement {
@@ -221,7 +346,7 @@ fn box_along(scene: &Scene, held: Option<(DVec3, DVec3)>, axes: DMat3) -> Option
 
 /// The largest scale at which the box's near face still fits the view, s·h ≤ window·(E − z − s·h_z)/E for each axis,
 /// with a rim of 5 %.
-fn fitted_scale(window: DVec2, half: DVec3, eye: f64, z: f64) -> Result<f64> {
+pub(super) fn fitted_scale(window: DVec2, half: DVec3, eye: f64, z: f64) -> Result<f64> {
     let fits = |window: f64, side: f64| window * (eye - z) / (eye * side + window * half.z);
     let scale = 0.95 * fits(window.x, half.x).min(fits(window.y, half.y));
     if scale.is_finite() && scale > 0.0 {
@@ -231,51 +356,8 @@ fn fitted_scale(window: DVec2, half: DVec3, eye: f64, z: f64) -> Result<f64> {
     }
 }
 
-/// Carries traced points into the hologram frame: position, amplitude √radiance × distance from the eye, phase.
-///
-/// The grid and wavelength say which directions the panel reaches; points beyond are kept and counted.
-pub fn place(points: &[WorldPoint], placing: &Placing, phase: Phase, panel: &Grid, wavelength: f64) -> Placed {
-    let positions = placing.positions(points);
-    let mut placed = Placed::default();
-    let (mut all_light, mut lost_light) = (0.0, 0.0);
-    let mut rgb = Vec::with_capacity(points.len());
-    let sine_limit = wavelength * DVec2::new(panel.limit_x(), panel.limit_y());
-    for (index, (point, position)) in points.iter().zip(positions).enumerate() {
-        let to_eye = placing.eye - position;
-        let distance = to_eye.length();
-        let light = f64::from(Channel::Luminance.of(point.radiance));
-        all_light += light;
-        if to_eye.x.abs() > sine_limit.x * distance || to_eye.y.abs() > sine_limit.y * distance {
-            placed.beyond_cone += 1;
-            lost_light += light;
-        }
-        let amplitude = |radiance: f32| (f64::from(radiance.max(0.0)).sqrt() * distance) as f32;
-        let phase = match phase {
-            Phase::Zero => 0.0,
-            Phase::Random { seed } => Random::new(seed, index as u64).phase(),
-            Phase::Path => path_phase(distance, wavelength),
-        };
-        rgb.push(point.radiance.map(amplitude));
-        placed.cloud.points.push(PointSource {
-            position,
-            amplitude: amplitude(Channel::Luminance.of(point.radiance)),
-            phase,
-        });
-    }
-    placed.cloud.rgb = Some(rgb);
-    placed.beyond_cone_light = if all_light > 0.0 { lost_light / all_light } else { 0.0 };
-    placed
-}
-
-/// −k·distance, reduced to 0 … 2π [rad], for a vacuum wavelength [m]: the phase with which a wave from that distance [m]
-/// arrives in step.
-pub(crate) fn path_phase(distance: f64, wavelength: f64) -> f64 {
-    let turns = -distance / wavelength;
-    std::f64::consts::TAU * (turns - turns.floor())
-}
-
 impl Placing {
-    fn positions(&self, points: &[WorldPoint]) -> Vec<DVec3> {
+    pub(super) fn positions(&self, points: &[WorldPoint]) -> Vec<DVec3> {
         match &self.map {
             Map::Model { hologram_from_world } => {
                 points.iter().map(|p| hologram_from_world.transform_point3(p.position)).collect()
@@ -284,31 +366,69 @@ impl Placing {
         }
     }
 
-    fn through_window(&self, points: &[WorldPoint], DepthMap { near, far, held }: DepthMap) -> Vec<DVec3> {
+    fn through_window(&self, points: &[WorldPoint], depths: DepthMap) -> Vec<DVec3> {
         let camera_from_world = self.camera.world_from_camera.inverse();
         let seen: Vec<DVec3> = points.iter().map(|p| camera_from_world.transform_point3(p.position)).collect();
-        let (half_width, half_height) = self.camera.half_size(self.aspect);
-        let depths = seen.iter().map(|p| -p.z);
-        let [nearest, farthest] = held.unwrap_or_else(|| {
-            [depths.clone().fold(f64::INFINITY, f64::min), depths.fold(f64::NEG_INFINITY, f64::max)]
-        });
-        let perspective = matches!(self.camera.projection, Projection::Perspective { .. });
-        // 1/(E − z) = α + β·s with s = 1/w: exact at both ends of the depth range.
-        let s = |w: f64| if perspective { 1.0 / w } else { w };
-        let reach = |z: f64| if perspective { 1.0 / (self.eye.z - z) } else { z };
-        let (near_s, far_s) = (s(nearest), s(farthest));
-        let slope = if near_s == far_s { 0.0 } else { (reach(near) - reach(far)) / (near_s - far_s) };
-        seen.iter()
-            .map(|p| {
-                let w = -p.z;
-                // Beyond depths that are held a point stands on the nearest or farthest plane.
-                let value = reach(near) + slope * (s(w.clamp(nearest, farthest)) - near_s);
-                let z = if perspective { self.eye.z - 1.0 / value } else { value };
-                let (x, y) = if perspective { (p.x / w, p.y / w) } else { (p.x, p.y) };
-                let spread = (self.eye.z - z) / self.eye.z;
-                DVec3::new(x / half_width * self.window.x * spread, y / half_height * self.window.y * spread, z)
-            })
-            .collect()
+        let scale = depths.scale(self, depths.held.unwrap_or_else(|| range(seen.iter().map(|p| -p.z))));
+        seen.iter().map(|p| scale.hologram_from_camera(self, *p)).collect()
+    }
+
+    /// The same placement with the depths that it takes from these points: then it places any other point as well.
+    pub fn fixed_by(mut self, points: &[WorldPoint]) -> Self {
+        let camera_from_world = self.camera.world_from_camera.inverse();
+        if let Map::Window(depths) = &mut self.map {
+            let seen = points.iter().map(|p| -camera_from_world.transform_point3(p.position).z);
+            depths.held.get_or_insert_with(|| range(seen));
+        }
+        self
+    }
+
+    /// The ray in the world that an eye point `eye` sees at the point `on_panel` of the panel's plane [m], both in the
+    /// hologram frame.
+    ///
+    /// A window's map of depth is a homography, so that a straight ray in the one space is one in the other; an
+    /// orthographic camera's is not, and its ray is the chord between the nearest and the farthest depth. Of a window whose
+    /// depths are not fixed ([`Placing::fixed_by`]) all of the scene stands on one plane.
+    pub fn ray(&self, eye: DVec3, on_panel: DVec2) -> Ray {
+        let (from, to) = self.line(eye, on_panel);
+        Ray { origin: from, direction: (to - from).normalize() }
+    }
+
+    /// All rays of one eye point: what [`Placing::ray`] says for each, at less cost.
+    pub fn rays(&self, eye: DVec3) -> EyeRays {
+        let [(from, to), (from_x, to_x), (from_y, to_y)] =
+            [DVec2::ZERO, DVec2::X, DVec2::Y].map(|on_panel| self.line(eye, on_panel));
+        EyeRays { from: [from, from_x - from, from_y - from], to: [to, to_x - to, to_y - to] }
+    }
+
+    /// Two points in the world on the line of sight of an eye through a point of the panel [m]; both are affine in that point.
+    fn line(&self, eye: DVec3, on_panel: DVec2) -> (DVec3, DVec3) {
+        let along = DVec3::new(on_panel.x, on_panel.y, 0.0) - eye;
+        // The point of the line of sight at depth z.
+        let at = |z: f64| eye + along * ((eye.z - z) / eye.z);
+        match &self.map {
+            Map::Model { hologram_from_world } => {
+                let world = hologram_from_world.inverse();
+                (world.transform_point3(eye), world.transform_point3(at(0.0)))
+            }
+            Map::Window(depths) => {
+                let scale = depths.scale(self, depths.held.unwrap_or([1.0, 1.0]));
+                let (from, to) = scale.line(self, at, eye.z);
+                let world = self.camera.world_from_camera;
+                (world.transform_point3(from), world.transform_point3(to))
+            }
+        }
+    }
+
+    /// Depth z at which a point of the world stands [m].
+    pub fn depth_of(&self, world: DVec3) -> f64 {
+        match &self.map {
+            Map::Model { hologram_from_world } => hologram_from_world.transform_point3(world).z,
+            Map::Window(depths) => {
+                let scale = depths.scale(self, depths.held.unwrap_or([1.0, 1.0]));
+                scale.z(-self.camera.world_from_camera.inverse().transform_point3(world).z)
+            }
+        }
     }
 
     /// The similarity transform of a model; a window has none, since it is true for one eye only.

@@ -4,7 +4,8 @@
 //! sample of a plane looks up the picture, not the other way round.
 
 use super::colour::Lasers;
-use super::images::{Picture16, PictureWindow, RgbDepth, open};
+use super::depth_map::open;
+use super::images::{Picture16, PictureWindow, RgbDepth};
 use super::{Channel, Placement};
 use crate::error::{Error, Result};
 use crate::field::Grid;
@@ -69,7 +70,8 @@ impl Slices {
         if planes == 0 || planes > 4096 {
             return Err(Error::out_of_range("layers", planes, "must be 1 to 4096"));
         }
-        let (low, high) = picture.depths().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
+        let known = picture.depths().flatten();
+        let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
         let count = if high > low { planes } else { 1 };
         let step = (high - low) / count as f64;
         // Middles of equal parts: no sample is farther off than half a part.
@@ -172,7 +174,7 @@ impl Slices {
                     for pixel in columns.clone() {
                         all += 1;
                         let here = cut.is_none_or(|cut| {
-                            let depth = cut.depth(pixel, line);
+                            let Some(depth) = cut.depth(pixel, line) else { return false };
                             depth >= z - half_step && (depth < z + half_step || last)
                         });
                         if here {
@@ -203,7 +205,7 @@ impl Slices {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::points::images::DepthScale;
+    use crate::points::depth_map::DepthReading;
 
     /// Left half near and red, right half far and green, its lower right corner black.
     fn picture(folder: &std::path::Path) -> [PathBuf; 2] {
@@ -230,7 +232,7 @@ mod tests {
         let panel = Grid::new(160, 80, 8e-6, 8e-6).expect("panel");
         let placement = Placement::Window { eye: 0.5, near: 0.0, far: -0.1 };
         let window = PictureWindow::new(&placement, [8, 4], &panel).expect("window");
-        let picture = RgbDepth::read(&rgb, &depth, DepthScale::WhiteNear, &placement).expect("picture");
+        let picture = RgbDepth::read(&rgb, &depth, &DepthReading::default(), &placement).expect("picture");
         let slices = Slices::of_depth(picture, window, &panel, 5).expect("slices");
         let depths = slices.depths().to_vec();
         assert!(depths.len() == 5 && depths[0] < depths[4], "{depths:?}");

@@ -1,6 +1,7 @@
 //! What an eye should see of a scene: the traced picture with the depth of each pixel.
 
-use super::placement::{Placed, Placing};
+use super::placed::Placed;
+use super::placement::Placing;
 use super::trace::{Traced, neighbours};
 use std::collections::{BTreeMap, VecDeque};
 

@@ -6,10 +6,11 @@
 //! ([`Animation::first_look`]). The file is read once, its textures are decoded once, and the light on surfaces is
 //! computed again only where a surface or a lamp has moved; where nothing has, the frame before is handed on.
 
-use crate::encode::Encoded;
+use crate::encode::{Encoded, Encoding};
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::hologram::{Computed, HologramReport};
+use crate::light_field::LightSource;
 use crate::panel::{Origin, Setup};
 use crate::pipeline::{self, Settings};
 use crate::points::trace::{self, TraceSettings};
@@ -52,8 +53,8 @@ pub struct AnimationFrame {
     pub time: f64,
     /// Points and picture.
     pub points: Arc<ScenePoints>,
-    /// What the field took.
-    pub field: HologramReport,
+    /// What the field took; none for frames that are made for an eye.
+    pub field: Option<HologramReport>,
     /// Levels for the panel.
     pub encoded: Arc<Encoded>,
     /// Whether nothing had moved since the frame before, which this one is again.
@@ -99,7 +100,7 @@ impl AnimationFrame {
             points: self.points.placed.cloud.points.len(),
             light_seconds: unless(self.light_kept, self.points.illumination.seconds),
             trace_seconds: unless(self.still, self.points.trace.seconds),
-            field_seconds: unless(self.still, self.field.seconds),
+            field_seconds: unless(self.still, self.field.as_ref().map_or(0.0, |field| field.seconds)),
             seconds: self.seconds,
             still: self.still,
             light_kept: self.light_kept,
@@ -116,7 +117,7 @@ impl Animation {
     /// [`Error::Parameter`] for a file without animation, a rate that is not positive, an interval without extent, or more
     /// than [`MAX_FRAMES`]; as [`gltf::File::open`].
     pub fn new(path: &Path, settings: &Settings, rate: f64, from: Option<f64>, to: Option<f64>) -> Result<Self> {
-        let file = gltf::File::open(path)?;
+        let file = gltf::File::open_with(path, &settings.scene.load)?;
         let Some([first, last]) = file.clip_times(&settings.scene.load.clip)? else {
             return Err(Error::input(
                 path,
@@ -148,7 +149,7 @@ impl Animation {
         let mut times: Vec<f64> = self.times.iter().copied().step_by(step).collect();
         times.extend(self.times.last());
         progress.start("first look", 2 * times.len() as u64);
-        let mut file = gltf::File::open(&self.path)?;
+        let mut file = gltf::File::open_with(&self.path, &self.settings.scene.load)?;
         let mut bounds: Option<(DVec3, DVec3)> = None;
         for &time in &times {
             progress.check()?;
@@ -215,9 +216,11 @@ impl Animation {
         progress: &Progress,
         take: &mut dyn FnMut(AnimationFrame) -> Result<bool>,
     ) -> Result<()> {
-        let mut file = gltf::File::open(&self.path)?;
+        let mut file = gltf::File::open_with(&self.path, &self.settings.scene.load)?;
         // The pose whose light was computed, its camera, and the last frame that it gave.
         let mut kept: Option<(LitScene, Camera, AnimationFrame)> = None;
+        // The phases that the last frame for an eye asks for.
+        let mut wishes = Vec::new();
         for (number, &time) in self.times.iter().enumerate() {
             let begin = Instant::now();
             progress.start("scene", 0);
@@ -234,7 +237,8 @@ impl Animation {
                         Some((lit, ..)) => lit,
                         None => LitScene::new(&self.path, pose, self.settings.scene.illumination, progress)?,
                     };
-                    let frame = self.frame(number, &lit, &seen_from, setup, progress)?;
+                    let frame =
+                        self.frame(number, Posed { lit: &lit, camera: &seen_from }, setup, &mut wishes, progress)?;
                     (lit, AnimationFrame { light_kept, ..frame })
                 }
             };
@@ -247,26 +251,23 @@ impl Animation {
         Ok(())
     }
 
-    /// A frame of its own for a pose.
+    /// A frame of its own for a pose; one for an eye goes on from the phases of the frame before, and leaves its own.
     fn frame(
         &self,
         number: usize,
-        lit: &LitScene,
-        camera: &Camera,
+        pose: Posed,
         setup: &Setup,
+        wishes: &mut Vec<Vec<f32>>,
         progress: &Progress,
     ) -> Result<AnimationFrame> {
         let (settings, time) = (&self.settings, self.times[number]);
-        let points = lit.points(camera, &settings.scene, &setup.grid, setup.wavelength, progress)?;
+        let points = pose.lit.points(pose.camera, &settings.scene, &setup.grid, setup.wavelength, progress)?;
         let cloud = &points.placed.cloud;
         let exposures = pipeline::exposures(setup, settings, None);
         let [exposure] = exposures.as_slice() else {
             return Err(Error::parameter("exposures", "an animation has one for each of its frames"));
         };
-        let computed = pipeline::field(cloud, exposure, setup, &settings.hologram, progress)?;
-        let Some(Computed { field, report }) = computed else {
-            return Err(Error::input(&self.path, "has no light for the laser"));
-        };
+        let dark = || Error::input(&self.path, "has no light for the laser");
         let origin = Origin {
             source: Some(self.path.display().to_string()),
             points: Some(cloud.points.len()),
@@ -274,19 +275,37 @@ impl Animation {
             notes: vec![format!("frame {number} of {}, at {time:.6} s", self.times.len())],
             ..Origin::default()
         };
-        let encoded = Arc::new(pipeline::frame(&field, setup, &settings.encode, origin, progress)?);
-        let points = Arc::new(points);
+        let (encoded, field) = if let Some(Encoding::View(view)) = &settings.encode.encoding {
+            let source = LightSource::Scene { lit: pose.lit, points: &points };
+            let (light, _) = pipeline::light_field(&source, setup, settings, progress)?;
+            let found = pipeline::views(&light, &settings.viewer, &exposures, setup, view, wishes, progress)?;
+            let viewed = found.into_iter().flatten().next().ok_or_else(dark)?;
+            *wishes = viewed.wishes;
+            let mut encoded = viewed.frames.into_iter().next().ok_or_else(dark)?;
+            encoded.frame.metadata.origin = origin;
+            (encoded, None)
+        } else {
+            let computed = pipeline::field(cloud, exposure, setup, &settings.hologram, progress)?;
+            let Computed { field, report } = computed.ok_or_else(dark)?;
+            (pipeline::frame(&field, setup, &settings.encode, origin, progress)?, Some(report))
+        };
         Ok(AnimationFrame {
             number,
             time,
-            points,
-            field: report,
-            encoded,
+            points: Arc::new(points),
+            field,
+            encoded: Arc::new(encoded),
             still: false,
             light_kept: false,
             seconds: 0.0,
         })
     }
+}
+
+/// A pose in its light, and the camera that it is seen by.
+struct Posed<'a> {
+    lit: &'a LitScene,
+    camera: &'a Camera,
 }
 
 fn first_camera<'a>(path: &Path, scene: &'a Scene) -> Result<&'a Camera> {

@@ -1,7 +1,7 @@
 //! A contact sheet: small pictures of a sequence beside each other, each with its number and time.
 
-use super::canvas::{Canvas, LETTER_HEIGHT, LETTER_WIDTH};
 use crate::error::{Error, Result};
+use crate::reconstruction::canvas::{Canvas, LETTER_HEIGHT, LETTER_WIDTH};
 use crate::reconstruction::{Picture, Scale};
 use std::path::Path;
 

@@ -4,11 +4,10 @@
 //! *animated scene* ([`animated`]), each of whose frames is a hologram. A [`contact`] sheet shows one at a glance.
 
 pub mod animated;
-pub mod canvas;
 pub mod contact;
 pub mod prepared;
 
+pub use crate::reconstruction::Canvas;
 pub use animated::{Animation, AnimationFrame, AnimationFrameReport};
-pub use canvas::Canvas;
 pub use contact::ContactSheet;
 pub use prepared::{Prepared, RawFormat, Shown, Source};

@@ -8,9 +8,10 @@ mod header;
 mod read;
 mod write;
 
-pub use read::{Read, read};
+pub use read::read;
 pub use write::write;
 
+use super::PointCloud;
 use crate::names::{Name, Named};
 use serde::{Deserialize, Serialize};
 
@@ -53,6 +54,19 @@ pub struct Metadata {
     /// Initial phase: zero, path, or random with its seed.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub phase: String,
+}
+
+/// A file's points with what it says of itself and what had to be repaired.
+#[derive(Clone, Debug, Default)]
+pub struct Read {
+    /// The points.
+    pub cloud: PointCloud,
+    /// Metadata of our own files.
+    pub metadata: Option<Metadata>,
+    /// How its values were taken where that is not plain, in words.
+    pub origin: String,
+    /// Repairs and assumptions, in words.
+    pub warnings: Vec<String>,
 }
 
 #[cfg(test)]

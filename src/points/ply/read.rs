@@ -1,30 +1,18 @@
 //! PLY in.
 
-use super::Metadata;
+use super::Read;
 use super::header::{self, Element, Encoding, Scalar};
 use crate::error::{Error, Result};
-use crate::points::{PointCloud, PointSource, luminance};
-use glam::DVec3;
+use crate::points::gather::{Gather, Role, Vertex};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read as _};
 use std::path::Path;
 
-/// A file's points with what it says of itself and what had to be repaired.
-#[derive(Clone, Debug, Default)]
-pub struct Read {
-    /// The points.
-    pub cloud: PointCloud,
-    /// Metadata of our own files.
-    pub metadata: Option<Metadata>,
-    /// Repairs and assumptions, in words.
-    pub warnings: Vec<String>,
-}
-
 /// Reads a point cloud.
 ///
 /// # Errors
-/// [`Error::Input`] when the file is not PLY, promises more points than it has, has no position, or a position,
-/// amplitude or phase is not finite. Colours outside their range are clamped, with a warning.
+/// [`Error::Input`] when the file is not PLY, promises more points than it has, or has no position. Points that are not finite
+/// are left out, colours outside their range clamped, with a warning each.
 pub fn read(path: &Path) -> Result<Read> {
     let file = File::open(path).map_err(Error::io(path))?;
     let length = file.metadata().map_err(Error::io(path))?.len();
@@ -44,7 +32,13 @@ pub fn read(path: &Path) -> Result<Read> {
     };
     let mut values = Values { input, encoding: header.encoding, path, item: 0, line: Vec::new() };
     for element in &header.elements[..at] {
-        // Elements before the points (OpenHolo's `color 1 / int channel`) are read over.
+        // Elements before the points (OpenHolo's `color 1 / int channel`) are read over; an item without values takes no byte,
+        // and none of a line's is empty.
+        if element.count > length {
+            let what =
+                format!("promises {} of `{}`, more than its {length} bytes can hold", element.count, element.name);
+            return Err(Error::input(path, what));
+        }
         for _ in 0..element.count {
             values.next_item(element, &mut |_, _| {})?;
         }
@@ -64,104 +58,38 @@ pub fn read(path: &Path) -> Result<Read> {
     Ok(out)
 }
 
-/// Which property a value is.
-#[derive(Clone, Copy, PartialEq)]
-enum Role {
-    Position(usize),
-    Amplitude,
-    AmplitudeRgb(usize),
-    Color(usize, f64),
-    Phase,
-    Other,
-}
-
 fn role(name: &str, scalar: Scalar) -> Role {
-    // Integer colours run to 255 (or 65535), float ones to 1.
+    // Whole numbers of colours run to 255 (or 65535).
     let full = match scalar {
-        s if s.is_float() => 1.0,
-        Scalar::U16 | Scalar::I16 => 65535.0,
-        _ => 255.0,
+        s if s.is_float() => None,
+        Scalar::U16 | Scalar::I16 => Some(65535.0),
+        _ => Some(255.0),
     };
-    match name {
-        "x" => Role::Position(0),
-        "y" => Role::Position(1),
-        "z" => Role::Position(2),
-        "amplitude" => Role::Amplitude,
-        "amplitude_r" => Role::AmplitudeRgb(0),
-        "amplitude_g" => Role::AmplitudeRgb(1),
-        "amplitude_b" => Role::AmplitudeRgb(2),
-        "red" | "r" | "diffuse_red" => Role::Color(0, full),
-        "green" | "g" | "diffuse_green" => Role::Color(1, full),
-        "blue" | "b" | "diffuse_blue" => Role::Color(2, full),
-        "phase" => Role::Phase,
-        _ => Role::Other,
-    }
+    Role::named(name, full)
 }
 
 fn vertices(element: &Element, values: &mut Values, out: &mut Read) -> Result<()> {
     let path = values.path;
-    let roles: Vec<Role> = element
-        .properties
-        .iter()
-        .map(|p| if p.list_count.is_some() { Role::Other } else { role(&p.name, p.scalar) })
-        .collect();
-    let has = |role: Role| roles.contains(&role);
+    let of = |p: &super::header::Property| match p.list_count {
+        Some(_) => Role::Other,
+        None => role(&p.name, p.scalar),
+    };
+    let roles: Vec<Role> = element.properties.iter().map(of).collect();
     for (axis, name) in ["x", "y", "z"].iter().enumerate() {
-        if !has(Role::Position(axis)) {
+        if !roles.contains(&Role::Position(axis)) {
             return Err(Error::input(path, format!("its vertices have no `{name}`")));
         }
     }
-    let exact_rgb = (0..3).all(|c| has(Role::AmplitudeRgb(c)));
-    let colors = roles.iter().any(|r| matches!(r, Role::Color(..)));
-    let colored = exact_rgb || colors && !has(Role::Amplitude);
-    let count = element.count as usize;
-    let mut points = Vec::with_capacity(count);
-    let mut rgb = Vec::with_capacity(if colored { count } else { 0 });
-    let mut clamped = 0u64;
-    for index in 0..count {
-        let (mut position, mut amplitude, mut phase) = (DVec3::ZERO, 1.0, 0.0);
-        let (mut exact, mut color) = ([0f64; 3], [1f64; 3]);
-        values.item = index as u64;
-        values.next_item(element, &mut |property, value| match roles[property] {
-            Role::Position(axis) => position[axis] = value,
-            Role::Amplitude => amplitude = value,
-            Role::AmplitudeRgb(c) => exact[c] = value,
-            Role::Color(c, full) => color[c] = value / full,
-            Role::Phase => phase = value,
-            Role::Other => {}
-        })?;
-        if !position.is_finite() {
-            let what = format!("point {index}: its position is not finite; remove or repair it");
-            return Err(Error::input(path, what));
-        }
-        let shown = if exact_rgb { exact } else { color };
-        let finite = amplitude.is_finite() && phase.is_finite() && shown.iter().all(|c| c.is_finite());
-        if !finite {
-            return Err(Error::input(path, format!("point {index}: its amplitude, colour or phase is not finite")));
-        }
-        let mut triple = shown.map(|c| c as f32);
-        if !exact_rgb && colored {
-            let inside = triple.map(|c| c.clamp(0.0, 1.0));
-            clamped += u64::from(inside != triple);
-            triple = inside;
-        }
-        let amplitude = if colored { luminance(triple.map(|a| a * a)).sqrt() } else { amplitude as f32 };
-        points.push(PointSource { position, amplitude, phase });
-        if colored {
-            rgb.push(triple);
-        }
+    let mut gather = Gather::new(&roles, element.count as usize);
+    for index in 0..element.count {
+        let mut point = Vertex::new();
+        values.item = index;
+        values.next_item(element, &mut |property, value| gather.put(roles[property], value, &mut point))?;
+        gather.push(&point);
     }
-    if clamped > 0 {
-        out.warnings.push(format!("{clamped} points had a colour outside its range; it was clamped"));
-    }
-    // A cloud whose three amplitudes are the same everywhere is colourless.
-    let gray = rgb.iter().all(|c| c[0] == c[1] && c[1] == c[2]);
-    if colored && gray && !exact_rgb {
-        for (point, c) in points.iter_mut().zip(&rgb) {
-            point.amplitude = c[0];
-        }
-    }
-    out.cloud = PointCloud { points, rgb: (colored && (exact_rgb || !gray)).then_some(rgb) };
+    let read = gather.finish();
+    out.warnings.extend(read.warnings);
+    (out.cloud, out.origin) = (read.cloud, read.origin);
     Ok(())
 }
 

@@ -81,8 +81,6 @@ fn malformed_files_are_refused_in_words() {
         "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
     let cases: Vec<(String, &str)> = vec![
         (format!("{head}0 0 1\n"), "ends at number 1"),
-        (format!("{head}0 0 nan\n0 0 1\n"), "not finite"),
-        (format!("{head}0 0 inf\n0 0 1\n"), "not finite"),
         (format!("{head}0 0\n0 0 1\n"), "too few values"),
         (format!("{head}0 0 a\n0 0 1\n"), "not a number"),
         (head.replace("vertex 2", "vertex 99999999999999"), "more than its"),
@@ -99,6 +97,36 @@ fn malformed_files_are_refused_in_words() {
         assert!(error.contains(expected), "{error} does not say `{expected}`");
         assert!(!error.contains('\n'), "one line: {error}");
     }
+}
+
+#[test]
+fn what_was_not_measured_is_left_out_and_scanners_intensities_and_colours_are_read() {
+    let folder = tempfile::tempdir().expect("folder");
+    let of = |properties: &str, rows: &str| {
+        let properties: String = properties.split(' ').map(|name| format!("property float {name}\n")).collect();
+        let count = rows.lines().count();
+        let text = format!("ply\nformat ascii 1.0\nelement vertex {count}\n{properties}end_header\n{rows}");
+        read(&file(&folder, text.as_bytes())).expect("read")
+    };
+    let back = of("x y z", "0 0 -1\nnan nan nan\n0 0 -2\n0 inf 0\n");
+    assert_eq!(back.cloud.points.len(), 2);
+    assert!(back.warnings.len() == 1 && back.warnings[0].starts_with("2 of 4 points"), "{:?}", back.warnings);
+    for name in ["intensity", "scalar_Intensity", "Intensity", "reflectance"] {
+        let back = of(&format!("x y z {name}"), "0 0 -1 800\n0 0 -1 200\n0 0 -1 -1\n");
+        assert_eq!(back.cloud.points.iter().map(|p| p.amplitude).collect::<Vec<_>>(), [1.0, 0.5, 0.0], "{name}");
+        assert!(back.warnings.is_empty() && back.origin.contains("up to 800"), "{name}");
+    }
+    let back = of("x y z red green blue", "0 0 -1 255 255 255\n0 0 -1 51 51 51\n");
+    assert_eq!(back.cloud.points.iter().map(|p| p.amplitude).collect::<Vec<_>>(), [1.0, 0.2]);
+    assert!(back.origin.contains("parts of 255"), "{}", back.origin);
+    let back = of("x y z red green blue", "0 0 -1 1.25 1 1\n0 0 -1 0.5 0.5 0.5\n");
+    assert!(back.cloud.points[1].amplitude == 0.5 && back.warnings.len() == 1, "{:?}", back.warnings);
+    // A splat: mid gray at half opacity, and a red one that is opaque.
+    let back = of("x y z f_dc_0 f_dc_1 f_dc_2 opacity", "0 0 -1 0 0 0 0\n0 0 -1 1.7724539 -1.7724539 -1.7724539 20\n");
+    let rgb = back.cloud.rgb.expect("coloured");
+    let gray = (crate::scene::texture::linear_from_srgb(0.5) * 0.5).sqrt();
+    assert!((rgb[0][1] - gray).abs() < 1e-6 && (rgb[1][0] - 1.0).abs() < 1e-4 && rgb[1][1] == 0.0, "{rgb:?}");
+    assert!(back.origin.contains("Gaussian splats"), "{}", back.origin);
 }
 
 proptest! {
