@@ -157,8 +157,7 @@ fn erfc_with(z: Complex64, gauss: Complex64) -> Complex64 {
     if z.re < 0.0 {
         return 2.0 - erfc_with(-z, gauss);
     }
-    static SERIES: LazyLock<Weideman> = LazyLock::new(Weideman::new);
-    let Weideman { scale, terms } = &*SERIES;
+    let (scale, terms) = series();
     let outer = (z + scale).inv();
     let ratio = (scale - z) * outer;
     let mut sum = Complex64::default();
@@ -169,7 +168,13 @@ fn erfc_with(z: Complex64, gauss: Complex64) -> Complex64 {
 }
 
 /// Terms of the rational series of w.
-const TERMS: usize = 40;
+pub(super) const TERMS: usize = 40;
+
+/// The scale L and the terms of the rational series of w.
+pub(super) fn series() -> (f64, &'static [f64; TERMS]) {
+    static SERIES: LazyLock<Weideman> = LazyLock::new(Weideman::new);
+    (SERIES.scale, &SERIES.terms)
+}
 
 /// The rational series of w: its scale L and its terms aₙ.
 struct Weideman {

@@ -2,7 +2,7 @@
 //!
 //! [`definition`] says what the field of a point is; [`oracle`] computes exactly that, slowly. The engines are a closed
 //! set ([`Method`]), each tested against the oracle as a complex field. [`plan`] chooses one for a wanted error and says
-//! why, in what time and memory; [`compute`] runs it.
+//! why, in what time and memory; [`compute`] runs it and measures what error came of it.
 //!
 //! ```
 //! use glam::DVec3;
@@ -23,6 +23,7 @@
 //! # Ok::<(), holodrive::Error>(())
 //! ```
 
+mod check;
 pub mod definition;
 mod dispersion;
 mod exact;
@@ -37,23 +38,21 @@ mod planner;
 mod recurrence;
 mod sources;
 mod tiles;
+mod verified;
 
+pub use check::Measured;
 pub use lanes::InstructionSet;
 pub use oracle::{oracle, oracle_at};
 pub use planner::plan;
 pub use sources::Coverage;
+pub use verified::compute;
 
 use crate::error::{Error, Result};
 use crate::field::{Field, Grid};
 use crate::names::{Name, Named};
 use crate::points::PointSource;
 use crate::progress::Progress;
-use definition::Optics;
-use exact::{Division, GPU_ROUNDING};
-use planner::{Engine, ORACLE_ERROR};
-use sources::{PointSum, sources};
-use std::time::Instant;
-use tiles::Products;
+use planner::Engine;
 
 /// How a field is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -156,12 +155,17 @@ pub struct HologramReport {
     pub seconds: f64,
     /// Time that the plan predicted [s].
     pub predicted_seconds: f64,
-    /// Bound on the relative L2 error against the definition.
+    /// Bound on the relative L2 error against the definition, relative to the field that is there: the engine's, or the
+    /// measured limit where that is higher.
     pub error_bound: f64,
+    /// The error that was measured after the field was made.
+    pub measured: Measured,
     /// Memory beside points and field [bytes].
     pub memory: u64,
     /// Points reached, left out and lost light; point–pixel pairs.
     pub coverage: Coverage,
+    /// Errors that could not be kept, with the numbers.
+    pub warnings: Vec<String>,
 }
 
 /// A field and how it came about.
@@ -171,75 +175,6 @@ pub struct Computed {
     pub field: Field,
     /// How it came about.
     pub report: HologramReport,
-}
-
-/// Computes the field as planned; the plan may come from another cloud of the same kind (its choices are kept).
-pub fn compute(
-    points: &[PointSource],
-    grid: &Grid,
-    wavelength: f64,
-    plan: &Plan,
-    progress: &Progress,
-) -> Result<Computed> {
-    let start = Instant::now();
-    let optics = Optics::new(grid, wavelength)?;
-    let cull = plan.settings.cull;
-    let sources = sources(points)?;
-    let sum = PointSum { optics: &optics, grid, sources: &sources, cull, progress };
-    let coverage = Coverage::of(points.len(), &sum);
-    progress.check()?;
-    let set = plan.instruction_set;
-    let division = |products: Products, error: f64| {
-        let division = Division::new(&sum, products, error);
-        progress.check().map(|()| division)
-    };
-    let cloud = || {
-        let cloud = planes::Cloud::new(&optics, grid, &sources);
-        progress.check().map(|()| cloud)
-    };
-    let (field, error_bound) = match plan.engine {
-        Engine::Oracle => (oracle::watched(points, grid, wavelength, cull, progress)?.to_f32(), ORACLE_ERROR),
-        Engine::Exact { error } => {
-            let division = division(Products::of(set), error)?;
-            (division.sum(&sum, set)?, division.error)
-        }
-        Engine::Recurrence { error } => {
-            let division = division(Products::Float, error)?;
-            (division.sum_by_recurrence(&sum, error, set)?, division.blocks(&optics, error).1)
-        }
-        Engine::Gpu { error } => {
-            let division = division(Products::Shader, error)?;
-            (division.sum_on_gpu(&sum)?, division.gpu_error())
-        }
-        Engine::GpuPlanes(parameters) => {
-            let cloud = cloud()?;
-            (gpu_planes(&cloud, &parameters, progress)?, parameters.error(&cloud) + GPU_ROUNDING)
-        }
-        Engine::Planes(parameters) => {
-            let cloud = cloud()?;
-            (planes::field(&cloud, &parameters, set, progress)?, parameters.error(&cloud))
-        }
-    };
-    let report = HologramReport {
-        method: plan.method,
-        reason: plan.reason.clone(),
-        instruction_set: set,
-        seconds: start.elapsed().as_secs_f64(),
-        predicted_seconds: plan.seconds,
-        error_bound,
-        memory: plan.memory,
-        coverage,
-    };
-    Ok(Computed { field, report })
-}
-
-#[cfg(feature = "gpu")]
-use gpu::planes::field as gpu_planes;
-
-/// A build without the engine.
-#[cfg(not(feature = "gpu"))]
-fn gpu_planes(_: &planes::Cloud, _: &planes::Parameters, _: &Progress) -> Result<Field> {
-    Err(exact::no_gpu())
 }
 
 /// Computes the field in `passes` that are shown as they come: first a quarter to the power of (`passes` − 1) of the
@@ -299,6 +234,8 @@ impl Computed {
         self.report.seconds += report.seconds;
         self.report.predicted_seconds += report.predicted_seconds;
         self.report.error_bound = self.report.error_bound.max(report.error_bound);
+        self.report.measured = self.report.measured.or_worse(report.measured);
+        self.report.warnings.extend(report.warnings);
         self.report.memory = self.report.memory.max(report.memory) + 8 * self.field.samples.len() as u64;
         (self.report.method, self.report.reason) = (report.method, report.reason);
         self
@@ -316,6 +253,8 @@ pub fn gpu_adapter() -> Result<&'static str> {
     Err(exact::no_gpu())
 }
 
+#[cfg(test)]
+mod adversarial;
 #[cfg(test)]
 mod properties;
 #[cfg(test)]

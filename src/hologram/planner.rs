@@ -41,6 +41,8 @@ fn has_hardware_gpu() -> bool {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Engine {
     Oracle,
+    /// The exact sum of the check, where faster engines have failed.
+    Whole,
     /// `direct` and `tiles`, with the error that tiles are chosen for.
     Exact {
         error: f64,

@@ -1,5 +1,6 @@
 //! Whatever points are given, every engine keeps its error or refuses, and never says NaN.
 
+use super::definition::Optics;
 use super::*;
 use crate::field::Complex64;
 use glam::DVec3;

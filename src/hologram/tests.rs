@@ -1,10 +1,11 @@
 //! Engines against the oracle, as complex fields.
 
+use super::definition::Optics;
 use super::*;
 use crate::field::relative_error;
 use crate::random::Random;
 use glam::DVec3;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A cloud over `extent` about `center` with z in `z`; random phases, or those of one smooth surface.
 fn cloud(n: usize, center: [f64; 2], extent: [f64; 2], z: [f64; 2], smooth: bool) -> Vec<PointSource> {
@@ -336,20 +337,20 @@ fn planes_on_the_gpu_of_every_rank_and_of_crowds_equal_those_of_the_cpu() {
     let mut points = cloud(3_000, [0.0; 2], [3e-3, 2e-3], [-0.03, 0.01], false);
     points.extend(cloud(2_500, [0.1e-3, 0.2e-3], [1e-4, 1e-4], [-0.011, -0.010], true));
     let optics = Optics::new(&grid, WAVELENGTH).expect("optics");
-    let sources = sources(&points).expect("sources");
+    let sources = super::sources::sources(&points).expect("sources");
     let cloud = planes::Cloud::new(&optics, &grid, &sources);
     let progress = Progress::new();
     for (planes, rank) in [(3, 1), (2, 2), (1, 3), (1, 4)] {
         let parameters = planes::Parameters { planes, rank, tail: 28.0, table: planes::Fineness::Fine };
         let set = InstructionSet::detect();
         let exact = planes::field(&cloud, &parameters, set, &progress).expect("cpu");
-        let got = gpu_planes(&cloud, &parameters, &progress).expect("gpu");
+        let got = super::verified::gpu_planes(&cloud, &parameters, &progress).expect("gpu");
         let wide: Vec<_> =
             exact.samples.iter().map(|u| crate::field::Complex64::new(u.re.into(), u.im.into())).collect();
         let found = relative_error(&got.samples, &wide);
         println!("{adapter}, {planes} planes, rank {rank}: {found:.2e}");
         assert!(found < 3e-5, "{planes} planes, rank {rank}: {found:.2e}");
-        let again = gpu_planes(&cloud, &parameters, &progress).expect("gpu");
+        let again = super::verified::gpu_planes(&cloud, &parameters, &progress).expect("gpu");
         assert_eq!(got, again, "rank {rank}");
     }
 }
@@ -383,12 +384,14 @@ fn gpu_stops_when_asked_and_is_never_chosen_where_it_is_the_cpu() {
     let grid = Grid::new(1920, 1080, 8e-6, 8e-6).expect("grid");
     let points = cloud(20_000, [0.0; 2], [0.012, 0.007], [-0.2, -0.25], false);
     let plan_of = |settings: &HologramSettings| plan(&points, &grid, WAVELENGTH, settings).expect("plan");
+    // An adapter in software shares the processor with the tests beside this one, which stretches its shortest dispatch.
+    let limit = if adapter.contains("llvmpipe") { 1.0 } else { 0.2 };
     for method in [Method::Gpu, Method::GpuPlanes] {
         let gpu = plan_of(&settings(method, 1e-3, InstructionSet::detect()));
         let delays = (0..3).map_while(|_| stopping_delay(&points, &grid, &gpu, Duration::from_millis(300)));
         if let Some(best) = delays.min_by(f64::total_cmp) {
             println!("{adapter}: {method:?} stopped {:.1} ms later", best * 1e3);
-            assert!(best < 0.2, "{method:?}: {best} s");
+            assert!(best < limit, "{method:?}: {best} s");
         }
     }
     if adapter.contains("llvmpipe") {

@@ -28,9 +28,11 @@
 //! ```
 
 mod band;
+mod resample;
 mod scaled;
 
 pub use band::limit;
+pub use resample::{Resampled, is_same_pitch, resample};
 pub use scaled::{ScaledPropagator, propagate_scaled};
 
 use crate::error::{Error, Result};
