@@ -3,50 +3,37 @@
 //! Each function is one arrow of the picture in the crate's documentation; [`run`] walks them all, and so does every
 //! command, live view and animation. One laser, three lasers and sub-frames differ only in their list of [`exposures`].
 
-use crate::encode::{self, EncodeOptions, Encoded};
+mod settings;
+
+pub use settings::{Bench, Hologram, Outcome, Settings};
+
+use crate::encode::view::{ViewTarget, Viewed};
+use crate::encode::{self, EncodeOptions, Encoded, Encoding, ViewEncoding};
 use crate::error::Result;
 use crate::field::{Complex32, Field};
 use crate::hologram::{self, Computed, HologramSettings};
-use crate::panel::simulated::{self, Simulation};
+use crate::light_field::{LightField, LightFieldReport, LightSource, Retina, Viewer};
+use crate::panel::simulated;
 use crate::panel::{Frame, Origin, Setup};
-use crate::points::{Channel, Exposure, LitScene, PointCloud, ScenePoints, SceneSettings, Share, SubFrames};
+use crate::points::{Exposure, LitScene, PointCloud, ScenePoints, SceneSettings, Share};
 use crate::progress::Progress;
-use crate::reconstruction::{ExposureLight, Gallery, Light, Target, ViewSettings};
+use crate::reconstruction::{Colour, ExposureLight, Gallery, Light, Seeing, SeenGallery, Target, ViewSettings};
 use glam::DVec3;
 use std::path::Path;
 
-/// How each step is done.
-#[derive(Clone, Debug, Default)]
-pub struct Settings {
-    /// Scene → points.
-    pub scene: SceneSettings,
-    /// Which light of a coloured cloud one laser shows.
-    pub channel: Channel,
-    /// Several frames for one picture, in one laser.
-    pub sub_frames: Option<SubFrames>,
-    /// Points → fields.
-    pub hologram: HologramSettings,
-    /// Fields → frames.
-    pub encode: EncodeOptions,
-    /// Frames → light.
-    pub bench: Bench,
-}
-
-/// The simulated bench: the panel's faults, and the stop behind it.
-#[derive(Clone, Debug, Default)]
-pub struct Bench {
-    /// What the panel does beside what it should.
-    pub simulation: Simulation,
-    /// Angle about the axis that a stop in the Fourier plane of the encoding's relay blocks [rad].
-    pub zero_order_stop: f64,
-}
-
-/// glTF → light on surfaces → points before the panel.
+/// glTF → light on its surfaces.
 ///
 /// # Errors
-/// As [`LitScene::load`] and [`LitScene::points`].
-pub fn points(scene: &Path, settings: &SceneSettings, setup: &Setup, progress: &Progress) -> Result<ScenePoints> {
-    let lit = LitScene::load(scene, settings, progress)?;
+/// As [`LitScene::load`].
+pub fn scene(scene: &Path, settings: &SceneSettings, progress: &Progress) -> Result<LitScene> {
+    LitScene::load(scene, settings, progress)
+}
+
+/// Light on surfaces → points before the panel.
+///
+/// # Errors
+/// As [`LitScene::points`].
+pub fn points(lit: &LitScene, settings: &SceneSettings, setup: &Setup, progress: &Progress) -> Result<ScenePoints> {
     lit.points(lit.camera(), settings, &setup.grid, setup.wavelength, progress)
 }
 
@@ -98,6 +85,46 @@ pub fn frame(
     Ok(encoded)
 }
 
+/// Scene in its light → what an eye anywhere in the viewer's box sees of it: what an encoding for the eye shows, and what every
+/// encoding is judged by.
+///
+/// # Errors
+/// As [`Retina::of`] and [`LightSource::views`].
+pub fn light_field(
+    source: &LightSource,
+    setup: &Setup,
+    settings: &Settings,
+    progress: &Progress,
+) -> Result<(LightField, Option<LightFieldReport>)> {
+    let retina = Retina::of(&settings.viewer, &setup.grid, setup.wavelength)?;
+    source.views(&settings.viewer, &retina, &settings.light_field(setup.lasers.is_some()), progress)
+}
+
+/// Light field → frames that show it to the viewer: those of sub-frames are found together, those of three lasers one by one;
+/// `None` for a laser that has no light. They go on from the phases `start`, where these are those of as many frames.
+///
+/// # Errors
+/// As [`ViewEncoding::encode`].
+pub fn views(
+    light: &LightField,
+    viewer: &Viewer,
+    exposures: &[Exposure],
+    setup: &Setup,
+    settings: &ViewEncoding,
+    start: &[Vec<f32>],
+    progress: &Progress,
+) -> Result<Vec<Option<Viewed>>> {
+    let retina = Retina::of(viewer, &setup.grid, setup.wavelength)?;
+    let together = exposures.chunk_by(|a, b| a.is_shown_with(b));
+    let found = together.map(|exposures| {
+        let light = &*light.of_exposure(&exposures[0]);
+        let target = ViewTarget { light, viewer, retina: &retina, setup, wavelength: exposures[0].wavelength };
+        let start = (start.len() == exposures.len()).then(|| start.to_vec());
+        (!light.is_dark()).then(|| settings.encode(&target, exposures.len(), start, progress)).transpose()
+    });
+    found.collect()
+}
+
 /// Frame → the object's field behind the simulated panel, and the stop that keeps its other orders out.
 ///
 /// The encoding's scale is divided out, so that intensities are those of the field that was encoded.
@@ -142,46 +169,54 @@ pub fn pictures(
     Gallery::mean(galleries, frames.len() / together.max(1))
 }
 
-/// One exposure's way from field to frame.
-#[derive(Clone, Debug)]
-pub struct Hologram {
-    /// Its laser and its share of the points.
-    pub exposure: Exposure,
-    /// The field on the panel.
-    pub computed: Computed,
-    /// The frame for the panel.
-    pub encoded: Encoded,
+/// Light → what the viewer sees of it through the pupil, judged against the light field.
+///
+/// Frames as those of [`pictures`].
+///
+/// # Errors
+/// As [`light`] and [`SeenGallery::of`].
+pub fn seen(
+    frames: &[Option<&Frame>],
+    setup: &Setup,
+    seeing: &Seeing,
+    bench: &Bench,
+    progress: &Progress,
+) -> Result<SeenGallery> {
+    let lit = frames.iter().enumerate().filter_map(|(index, frame)| Some((index, (*frame)?)));
+    let laser = |index| if setup.lasers.is_some() { index } else { 0 };
+    let each = lit.map(|(index, frame)| Ok(ExposureLight { laser: laser(index), ..light(frame, bench, progress)? }));
+    SeenGallery::of(each, seeing, progress)
 }
 
-/// What came out of the whole way.
-#[derive(Clone, Debug)]
-pub struct Outcome {
-    /// The scene as points, and the traced picture.
-    pub points: ScenePoints,
-    /// Field and frame of each exposure; `None` for one of three lasers that has no light.
-    pub holograms: Vec<Option<Hologram>>,
-    /// What is seen of them on the simulated bench, with figures.
-    pub pictures: Gallery,
-}
-
-/// Scene → points → fields → frames → light → pictures.
+/// Scene → points → fields → frames → light → pictures; or scene → light field → frames, for an encoding that is made for the
+/// eye.
 ///
 /// # Errors
 /// Those of the steps.
 pub fn run(scene: &Path, setup: &Setup, settings: &Settings, progress: &Progress) -> Result<Outcome> {
-    let points = points(scene, &settings.scene, setup, progress)?;
-    let cloud = &points.placed.cloud;
-    let content = points.content();
+    let lit = self::scene(scene, &settings.scene, progress)?;
+    let points = points(&lit, &settings.scene, setup, progress)?;
+    let (cloud, viewer, content) = (&points.placed.cloud, &settings.viewer, points.content());
+    let views_seen = light_field(&LightSource::Scene { lit: &lit, points: &points }, setup, settings, progress)?.0;
     let origin = Origin { source: Some(scene.display().to_string()), depth: content.depth, ..Origin::default() };
-    let hologram = |exposure: Exposure| {
-        let Some(computed) = field(cloud, &exposure, setup, &settings.hologram, progress)? else { return Ok(None) };
-        let encoded = frame(&computed.field, setup, &settings.encode, origin.clone(), progress)?;
-        Ok(Some(Hologram { exposure, computed, encoded }))
-    };
     let exposures = exposures(setup, settings, points.path_eye(settings.scene.phase));
-    let holograms = exposures.into_iter().map(hologram).collect::<Result<Vec<_>>>()?;
+    let holograms: Vec<_> = if let Some(Encoding::View(view)) = &settings.encode.encoding {
+        let found = views(&views_seen, viewer, &exposures, setup, view, &[], progress)?;
+        let frames = found.into_iter().flat_map(Viewed::frames_or_none).zip(exposures);
+        frames.map(|(e, exposure)| e.map(|encoded| Hologram { exposure, computed: None, encoded })).collect()
+    } else {
+        let hologram = |exposure: Exposure| {
+            let Some(computed) = field(cloud, &exposure, setup, &settings.hologram, progress)? else { return Ok(None) };
+            let encoded = frame(&computed.field, setup, &settings.encode, origin.clone(), progress)?;
+            Ok(Some(Hologram { exposure, computed: Some(computed), encoded }))
+        };
+        exposures.into_iter().map(hologram).collect::<Result<_>>()?
+    };
     let frames: Vec<_> = holograms.iter().map(|h| h.as_ref().map(|h| &h.encoded.frame)).collect();
     let target = Target::new(content, (settings.sub_frames.is_none()).then_some(&points));
     let pictures = pictures(&frames, setup, &target, &settings.bench, progress)?;
-    Ok(Outcome { points, holograms, pictures })
+    let colour = Colour::of(setup.lasers, setup.wavelength, settings.channel);
+    let seeing = Seeing::of_scene(&views_seen, viewer, colour, &points);
+    let seen = seen(&frames, setup, &seeing, &settings.bench, progress)?;
+    Ok(Outcome { points, holograms, pictures, seen })
 }

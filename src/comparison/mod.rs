@@ -23,8 +23,12 @@
 //! Every figure is simulated.
 
 mod pictures;
+#[cfg(test)]
+mod view_tests;
+mod views;
 
 pub use pictures::{flat_picture, scene_picture};
+pub use views::{VIEW_ENCODINGS, ViewCase, ViewRow, ViewScene, compare_views, view_cases, views_markdown};
 
 use crate::encode::iterative::TargetPlane;
 use crate::encode::pictures::{DepthPicture, encode_planes};
@@ -126,9 +130,10 @@ pub fn panels(width: usize, height: usize) -> Result<Vec<ComparedPanel>> {
 /// order lies beyond its corner.
 const BAND: f64 = 0.45;
 
-/// All encodings of the table, by name.
+/// All encodings of the table, by name: those of pictures and of fields on the panel.
 pub fn encodings() -> Vec<&'static str> {
-    Encoding::NAMES.iter().map(|(name, ..)| *name).collect()
+    let of_views = |name: &&str| matches!(Encoding::named(name), Ok(Encoding::View(_)));
+    Encoding::NAMES.iter().map(|(name, ..)| *name).filter(|name| !of_views(name)).collect()
 }
 
 /// Encodes a picture and measures what comes of it.

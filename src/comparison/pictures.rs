@@ -68,7 +68,8 @@ pub fn scene_picture(scene: &Path, setup: &Setup, planes: usize, progress: &Prog
         trace: TraceSettings { width: side, height: side, ..TraceSettings::default() },
         ..SceneSettings::default()
     };
-    let points = pipeline::points(scene, &settings, setup, progress)?;
+    let lit = pipeline::scene(scene, &settings, progress)?;
+    let points = pipeline::points(&lit, &settings, setup, progress)?;
     let (view, white) = (&points.view, points.white.white);
     let values: Vec<f32> =
         view.picture.iter().map(|rgb| Channel::Luminance.of(*rgb).clamp(0.0, white) / white).collect();

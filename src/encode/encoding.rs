@@ -2,7 +2,7 @@
 
 use super::{
     BandGradient, Binarisation, BinaryFringe, Cell, CellHologram, DoublePhase, ErrorDiffusion, OffAxis, PlaneEncoding,
-    PlaneMethod,
+    PlaneMethod, ViewEncoding,
 };
 use crate::names::{Name, Named};
 use crate::panel::Modulation;
@@ -26,6 +26,8 @@ pub enum Encoding {
     Gradient(BandGradient),
     /// Phases found so that the field's amplitudes stand on planes, whatever their phases there.
     Planes(PlaneEncoding),
+    /// Phases found so that an eye's pupil sees the views of a light field ([`super::view`]).
+    View(ViewEncoding),
     /// Amplitudes of neighbouring columns whose light has different phases along the carrier.
     Cells(CellHologram),
     /// Fringes of two amplitudes.
@@ -46,6 +48,7 @@ impl Named for Encoding {
         ("gerchberg-saxton", || planes(PlaneMethod::GerchbergSaxton), "amplitudes at depths by projections"),
         ("weighted", || planes(PlaneMethod::Weighted), "the same, what is too dark weighted up"),
         ("double-constraint", || planes(PlaneMethod::DoubleConstraint), "amplitude and phase at depths: no speckle"),
+        ("view", || Self::View(ViewEncoding::default()), "what an eye's pupil sees of the scene"),
         ("burckhardt", || cells(Cell::Burckhardt), "three amplitudes for one complex value"),
         ("lee", || cells(Cell::Lee), "four amplitudes for one complex value"),
         ("binary-threshold", || binary(Binarisation::Threshold), "fringes of two amplitudes by threshold"),
@@ -63,6 +66,7 @@ impl Named for Encoding {
             Self::ErrorDiffusion(_) => "error-diffusion",
             Self::Gradient(_) => "gradient",
             Self::Planes(settings) => settings.method.name(),
+            Self::View(_) => "view",
             Self::Cells(settings) => settings.cell.name(),
             Self::Binary(settings) => settings.method.name(),
         }
@@ -93,9 +97,12 @@ impl Encoding {
     /// What its pattern modulates.
     pub fn modulation(&self) -> Modulation {
         match self {
-            Self::DoublePhase(_) | Self::Kinoform | Self::ErrorDiffusion(_) | Self::Gradient(_) | Self::Planes(_) => {
-                Modulation::Phase
-            }
+            Self::DoublePhase(_)
+            | Self::Kinoform
+            | Self::ErrorDiffusion(_)
+            | Self::Gradient(_)
+            | Self::Planes(_)
+            | Self::View(_) => Modulation::Phase,
             Self::OffAxisBipolar(_)
             | Self::OffAxisIntensity(_)
             | Self::SingleSideBand(_)

@@ -14,6 +14,7 @@
 //! | [`Encoding::ErrorDiffusion`] | phase | half the panel's by default | as double phase |
 //! | [`Encoding::Gradient`] | phase | half the panel's by default | what the best fit takes |
 //! | [`Encoding::Planes`] | phase | all | nearly all; as asked where light may be free |
+//! | [`Encoding::View`] | phase | all | nearly all, into the eye box |
 //! | [`Encoding::Cells`] | amplitude | a third or a quarter along x | 1/12 (Burckhardt), 1/16 (Lee) |
 //! | [`Encoding::Binary`] | amplitude, 1 bit | half the panel's along the carrier | 1/π² by threshold |
 //!
@@ -49,9 +50,11 @@ pub mod fringe;
 mod iterated;
 pub mod iterative;
 pub mod kinoform;
+mod model;
 pub mod off_axis;
 mod options;
 pub mod pictures;
+pub mod view;
 
 pub use binary::{Binarisation, BinaryFringe};
 pub use cells::{Cell, CellHologram};
@@ -62,6 +65,7 @@ pub use fringe::Quantity;
 pub use iterated::{BandGradient, PlaneEncoding, PlaneMethod, PlaneStart};
 pub use off_axis::{OffAxis, Reference};
 pub use options::EncodeOptions;
+pub use view::ViewEncoding;
 
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Field};
@@ -319,6 +323,11 @@ fn unstopped_pattern(
         }
         Encoding::Planes(settings) => {
             return iterated::of_field(field, settings, profile, illumination, progress);
+        }
+        Encoding::View(_) => {
+            let what =
+                "view is made from the views of a scene, not from a field on the panel: take kinoform or gradient";
+            return Err(Error::parameter("encoding", what));
         }
         Encoding::Cells(settings) => cells::pattern(field, settings, progress),
         Encoding::Binary(settings) => binary::pattern(field, settings, progress),

@@ -148,6 +148,7 @@ impl Emitters {
             sum += tally.mean() * factor as f32;
         }
         let arriving = |light: &PunctualLight| match punctual_light(optics.scene(), light, at) {
+            Some((strength, end)) if light.kind == LightKind::Eye => strength * optics.seen_from(end, point),
             Some((strength, end)) => strength * optics.transmittance(point, end),
             None => Vec3::ZERO,
         };
@@ -252,7 +253,7 @@ pub(crate) fn punctual_light(scene: &Scene, light: &PunctualLight, at: ShadingPo
     let ShadingPoint { position: point, normal } = at;
     let (towards, distance, strength) = match light.kind {
         LightKind::Directional => (-light.direction.as_dvec3(), f64::INFINITY, 1.0),
-        LightKind::Point | LightKind::Spot { .. } => {
+        LightKind::Point | LightKind::Eye | LightKind::Spot { .. } => {
             let span = light.position.as_dvec3() - point;
             let distance = span.length();
             let range = f64::from(light.range);

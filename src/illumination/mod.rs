@@ -36,6 +36,7 @@ mod form_factor;
 mod images;
 #[cfg(test)]
 mod images_tests;
+mod irradiance_cache;
 mod lamp_image;
 mod meshing;
 mod patches;
@@ -55,7 +56,9 @@ pub(crate) mod test_rooms;
 mod tests;
 
 pub use form_factor::FormFactor;
+pub(crate) use irradiance_cache::IrradianceCache;
 pub use radiosity::Convergence;
+pub(crate) use shading::DiffuseLight;
 pub(crate) use surface::Surface;
 
 use crate::error::{Error, Result};

@@ -76,13 +76,31 @@ impl Optics {
         }
     }
 
+    /// As [`Optics::transmittance`] for light that comes from an eye: one-sided surfaces whose backs the eye sees do not
+    /// stand in its way.
+    pub(crate) fn seen_from(&self, eye: DVec3, point: DVec3) -> Vec3 {
+        let length = (point - eye).length();
+        let ray = Ray { origin: eye, direction: (point - eye) / length };
+        if !self.any_passes {
+            return if self.bvh.meet(&ray, 0.0, length, Sides::Front).is_some() { Vec3::ZERO } else { Vec3::ONE };
+        }
+        match self.solid_for(ray, length, Sides::Front) {
+            (None, tint) => tint,
+            (Some(_), _) => Vec3::ZERO,
+        }
+    }
+
     /// The first surface along a ray before `length` [m] that is not passed straight on, with the ray that starts behind
     /// the last passed one, and what the passed ones have left of the light.
     pub(crate) fn solid(&self, ray: Ray, length: f64) -> (Option<(Meeting, Ray)>, Vec3) {
+        self.solid_for(ray, length, Sides::Both)
+    }
+
+    fn solid_for(&self, ray: Ray, length: f64, sides: Sides) -> (Option<(Meeting, Ray)>, Vec3) {
         let bvh = &self.bvh;
         let (mut ray, mut left, mut tint) = (ray, length, Vec3::ONE);
         for _ in 0..=self.bounces {
-            let Some(meeting) = bvh.meet(&ray, 0.0, left, Sides::Both) else { return (None, tint) };
+            let Some(meeting) = bvh.meet(&ray, 0.0, left, sides) else { return (None, tint) };
             if !self.passes[meeting.triangle as usize] {
                 return (Some((meeting, ray)), tint);
             }

@@ -19,6 +19,19 @@ struct MeshPoint {
     weights: [f32; 3],
 }
 
+/// What surfaces show to a look, wherever it is kept.
+pub(crate) trait DiffuseLight {
+    /// Radiance that a surface's diffuse part and its emission send out at a hit [W/(m² sr)]; a pixel is `footprint` wide
+    /// there [m], and a mean is taken over `share` looks like this.
+    fn shown(&self, hit: &Hit, surface: &Surface, footprint: f64, share: u32, random: &mut Random) -> Vec3;
+}
+
+impl DiffuseLight for Illumination {
+    fn shown(&self, hit: &Hit, surface: &Surface, _: f64, share: u32, random: &mut Random) -> Vec3 {
+        self.radiance(hit, surface, share, random)
+    }
+}
+
 impl Illumination {
     /// Radiance that a surface's diffuse part and its emission send out at a hit [W/(m² sr)].
     ///
@@ -28,11 +41,16 @@ impl Illumination {
         if !surface.is_diffuse() {
             return surface.emission;
         }
+        surface.emission + surface.albedo * self.received(hit, surface, share, random)
+    }
+
+    /// Irradiance over π at a hit [W/(m² sr)]: what a white surface would show.
+    pub(super) fn received(&self, hit: &Hit, surface: &Surface, share: u32, random: &mut Random) -> Vec3 {
         let found = self.mesh.locate(hit.triangle, hit.front, hit.barycentric.map(|b| b as f32));
         let (element, weights) = found.unwrap_or((NONE, [0.0; 3]));
         let place = MeshPoint { element, weights };
         let direct = self.direct(place, surface, share.max(1), random);
-        surface.emission + surface.albedo * (direct + self.indirect(place, surface, share.max(1), random))
+        direct + self.indirect(place, surface, share.max(1), random)
     }
 
     /// Irradiance over π that comes from lamps, straight or by way of mirrors and glass.

@@ -1,9 +1,8 @@
 //! The operator's view: what is seen, the frame itself, its levels, and what it took.
 
 use crate::panel::Frame;
+use crate::reconstruction::canvas::{Canvas, LETTER_HEIGHT};
 use crate::reconstruction::{Picture, Scale};
-use crate::sequence::Canvas;
-use crate::sequence::canvas::LETTER_HEIGHT;
 
 /// Size of the whole view (columns, rows) [px].
 pub const SIZE: (usize, usize) = (900, 580);

@@ -1,7 +1,8 @@
 //! What an eye sees of the newest hologram, reconstructed on a thread of its own.
 
 use super::background::{Background, Desk};
-use super::worker::{Detail, LiveHologram};
+use super::request::Detail;
+use super::worker::LiveHologram;
 use crate::error::{Error, Result};
 use crate::panel::Frame;
 use crate::pipeline::{self, Bench};

@@ -1,7 +1,9 @@
 //! The thread that computes what was last requested.
 
 use super::background::{Background, Desk};
-use crate::encode::{EncodeOptions, Encoding};
+use super::request::{Detail, Request};
+use super::tracked::{Subject, Tracked};
+use crate::encode::Encoding;
 use crate::error::{Error, Result};
 use crate::hologram::{HologramReport, HologramSettings};
 use crate::panel::{Frame, Modulation, Origin, Setup};
@@ -11,7 +13,6 @@ use crate::points::{LitScene, ScenePoints, SceneSettings};
 use crate::progress::Progress;
 use crate::scene::{Camera, Scene, SceneBvh, gltf};
 use glam::{DMat4, DVec3};
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
@@ -24,45 +25,6 @@ const USUAL_PERCENTILE: f64 = 0.9;
 /// Rays of the middle level, as a share of those that were asked for.
 const MIDDLE_SHARE: f64 = 0.5;
 
-/// How the scene should stand before the panel, and in which light and encoding.
-#[derive(Clone, Debug)]
-pub struct Request {
-    /// The scene turned about its middle: to the right about the camera's up, and up about its right [rad].
-    pub turn: [f64; 2],
-    /// The hologram shifted along x, y and z [m].
-    pub shift: DVec3,
-    /// Wavelength [m].
-    pub wavelength: f64,
-    /// How the field is encoded.
-    pub encode: EncodeOptions,
-}
-
-/// How fine a hologram is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Detail {
-    /// Few rays, rough light, a field to 3 %: something to see at once.
-    Coarse,
-    /// Half the rays.
-    Middle,
-    /// As asked.
-    Full,
-}
-
-impl Detail {
-    /// The levels in their order.
-    pub const ALL: [Self; 3] = [Self::Coarse, Self::Middle, Self::Full];
-
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Coarse => "coarse",
-            Self::Middle => "middle",
-            Self::Full => "full",
-        }
-    }
-}
-
 /// A hologram of one level of detail for one request.
 #[derive(Clone, Debug)]
 pub struct LiveHologram {
@@ -74,9 +36,9 @@ pub struct LiveHologram {
     pub frame: Frame,
     /// Points and picture, where they stand for this request.
     pub points: Arc<ScenePoints>,
-    /// What the field took.
-    pub field: HologramReport,
-    /// Time that light and rays took [s].
+    /// What the field took; none for a frame that was made for an eye.
+    pub field: Option<HologramReport>,
+    /// Time that light, rays and views took [s].
     pub light_seconds: f64,
     /// Time that the encoding took [s].
     pub encode_seconds: f64,
@@ -124,7 +86,7 @@ impl Worker {
     /// # Errors
     /// As [`gltf::load`]: a scene that cannot be read at the beginning is not waited for.
     pub fn start(path: &Path, setup: Setup, settings: Settings, request: Request) -> Result<(Self, Vec<PathBuf>)> {
-        let mut file = gltf::File::open(path)?;
+        let mut file = gltf::File::open_with(path, &settings.scene.load)?;
         let files = file.files();
         let first = file.pose(&settings.scene.load)?;
         let order = Order { request, version: 1, since: Instant::now(), reload: false };
@@ -181,6 +143,7 @@ impl Studio {
         // Where whoever asked has gone, the next look at the order ends the thread.
         let tell = |event| drop(told.send(event));
         let mut lights = Lights::new(first);
+        let mut tracked = Tracked::default();
         let mut done = 0;
         loop {
             let next = desk.next(|order| {
@@ -193,13 +156,21 @@ impl Studio {
                     Ok((files, next)) => {
                         tell(WorkerEvent::Loaded(files));
                         lights = Lights::new(next);
+                        tracked = Tracked::default();
                     }
                     Err(error) => tell(WorkerEvent::Failed(error.to_string())),
                 }
             }
             done = order.version;
-            for detail in self.levels() {
-                match self.compute(detail, &order, &mut lights, &running) {
+            let is_view = matches!(order.request.encode.encoding, Some(Encoding::View(_)));
+            let levels = if is_view { vec![Detail::Coarse, Detail::Full] } else { self.levels() };
+            for detail in levels {
+                let found = if is_view {
+                    self.track(detail, &order, &mut lights, &mut tracked, &running)
+                } else {
+                    self.compute(detail, &order, &mut lights, &running)
+                };
+                match found {
                     Ok(hologram) => tell(WorkerEvent::Ready(Box::new(hologram))),
                     Err(Error::Interrupted) => {
                         let since = desk.look(|order| order.since);
@@ -216,7 +187,7 @@ impl Studio {
     }
 
     fn load(&self) -> Result<(Vec<PathBuf>, gltf::Loaded)> {
-        let mut file = gltf::File::open(&self.path)?;
+        let mut file = gltf::File::open_with(&self.path, &self.settings.scene.load)?;
         let loaded = file.pose(&self.settings.scene.load)?;
         Ok((file.files(), loaded))
     }
@@ -266,7 +237,47 @@ impl Studio {
             detail,
             frame: encoded.frame,
             points: Arc::new(points),
-            field: computed.report,
+            field: Some(computed.report),
+            light_seconds,
+            encode_seconds: begin.elapsed().as_secs_f64(),
+            seconds: order.since.elapsed().as_secs_f64(),
+        })
+    }
+
+    /// A frame that is made for the eye where it is.
+    fn track(
+        &self,
+        detail: Detail,
+        order: &Order,
+        lights: &mut Lights,
+        tracked: &mut Tracked,
+        progress: &Progress,
+    ) -> Result<LiveHologram> {
+        let begin = Instant::now();
+        let request = &order.request;
+        let setup = Setup { wavelength: request.wavelength, ..self.setup.clone() };
+        if !tracked.serves(request, detail) {
+            let mut settings = self.scene_at(Detail::Coarse);
+            settings.illumination = self.scene_at(detail).illumination;
+            if request.shift.truncate() != glam::DVec2::ZERO {
+                let why = "a scene that is made for an eye stands in its window; turn it, or move it nearer or farther";
+                return Err(Error::parameter("shift", why));
+            }
+            settings.placement = settings.placement.nearer(request.shift.z);
+            let lit = lights.at(detail, &self.path, &settings, progress)?;
+            let camera = turned(lit.camera(), lit.scene(), request.turn);
+            let points = lit.points(&camera, &settings, &setup.grid, setup.wavelength, progress)?;
+            tracked.look_at(Subject { lit, points }, request, detail, &setup, &self.settings, progress)?;
+        }
+        let light_seconds = begin.elapsed().as_secs_f64();
+        let begin = Instant::now();
+        let (frame, points) = tracked.frame(request, detail, &setup, &self.settings, &self.path, progress)?;
+        Ok(LiveHologram {
+            version: order.version,
+            detail,
+            frame,
+            points,
+            field: None,
             light_seconds,
             encode_seconds: begin.elapsed().as_secs_f64(),
             seconds: order.since.elapsed().as_secs_f64(),

@@ -12,6 +12,7 @@
 use super::metrics::{self, Likeness};
 use super::{ColorPicture, Cone, Picture, Scale, View, ViewSettings, all_in_focus, focus_step, intensity, picture};
 use crate::error::{Error, Result};
+use crate::field::arrays::{self, Named, Values};
 use crate::field::{Field, npy};
 use crate::points::colour::Lasers;
 use crate::progress::Progress;
@@ -65,7 +66,7 @@ impl Light {
                 let (grid, values) = intensity(field, view, half, settings, progress)?;
                 return Ok(Picture { width: grid.width, height: grid.height, values });
             }
-            let cells = |half: f64, pitch: f64| (2.0 * half / pitch).ceil() as usize;
+            let cells = |half: f64, pitch: f64| super::cells(half, pitch) as usize;
             let size = size.unwrap_or_else(|| (cells(half.x, field.grid.pitch_x), cells(half.y, field.grid.pitch_y)));
             let mut seen = picture(field, view, half, size, settings, progress)?;
             if let (View::Plane { z }, true) = (*view, self.lasers.is_some()) {
@@ -123,8 +124,19 @@ impl Light {
 }
 
 impl Reconstruction {
-    /// Writes a picture of a view as .png, sRGB-coded with `white` as white, or linear as .npy; `lasers` are those of a picture in colour.
+    /// Writes a picture of a view as .png, sRGB-coded with `white` as white, or linear as .npy, and in gray as .mat, .h5 or .tif; `lasers` are those of a picture in colour.
     pub fn write(&self, path: &Path, lasers: Option<&Lasers>, white: f32, view: &View, half: DVec2) -> Result<()> {
+        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        if matches!(ending.as_str(), "mat" | "h5" | "tif" | "tiff") {
+            let Self::Gray(seen) = self else {
+                return Err(Error::input(path, "a picture in colour is written as .png or .npy"));
+            };
+            let values = Values::Real(seen.values.iter().map(|v| f64::from(*v)).collect());
+            return arrays::write(
+                path,
+                &[Named { name: "intensity", shape: [seen.height, seen.width], values: &values }],
+            );
+        }
         let is_npy = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
         let mut described = serde_json::json!({
             "simulated": true,

@@ -14,6 +14,12 @@ pub fn psnr(a: &[f32], b: &[f32]) -> f64 {
 /// the windows that lie wholly inside (Wang, Bovik, Sheikh & Simoncelli, *IEEE Trans. Image Processing* 13 (2004),
 /// eq. 13). Pictures smaller than the window give the value of one window over all of them.
 pub fn ssim(a: &[f32], b: &[f32], width: usize, height: usize) -> f64 {
+    let windows = ssim_windows(a, b, width, height);
+    windows.iter().sum::<f64>() / windows.len() as f64
+}
+
+/// Structural similarity in each of [`ssim`]'s windows, row-major by their places.
+pub(super) fn ssim_windows(a: &[f32], b: &[f32], width: usize, height: usize) -> Vec<f64> {
     assert!(a.len() == b.len() && a.len() == width * height, "pictures of one size are compared");
     let (c1, c2) = (0.01f64.powi(2), 0.03f64.powi(2));
     let product =
@@ -21,14 +27,11 @@ pub fn ssim(a: &[f32], b: &[f32], width: usize, height: usize) -> f64 {
     let wide = |p: &[f32]| -> Vec<f64> { p.iter().map(|v| f64::from(*v)).collect() };
     let [ma, mb, aa, bb, ab] =
         [wide(a), wide(b), product(a, a), product(b, b), product(a, b)].map(|v| blurred(&v, width, height));
-    let count = ma.len() as f64;
-    let mut sum = 0.0;
-    for i in 0..ma.len() {
+    let window = |i: usize| {
         let (va, vb, cov) = (aa[i] - ma[i] * ma[i], bb[i] - mb[i] * mb[i], ab[i] - ma[i] * mb[i]);
-        sum +=
-            ((2.0 * ma[i] * mb[i] + c1) * (2.0 * cov + c2)) / ((ma[i] * ma[i] + mb[i] * mb[i] + c1) * (va + vb + c2));
-    }
-    sum / count
+        ((2.0 * ma[i] * mb[i] + c1) * (2.0 * cov + c2)) / ((ma[i] * ma[i] + mb[i] * mb[i] + c1) * (va + vb + c2))
+    };
+    (0..ma.len()).map(window).collect()
 }
 
 /// Gaussian means over the windows that lie inside.

@@ -25,6 +25,7 @@
 //! # Ok::<(), holodrive::Error>(())
 //! ```
 
+pub mod canvas;
 pub mod colour;
 mod flat_field;
 mod gallery;
@@ -32,13 +33,18 @@ mod light;
 pub mod metrics;
 pub mod orders;
 mod picture;
+pub mod seen;
+mod sharpest;
 
+pub use canvas::Canvas;
 pub use colour::ColorPicture;
 use flat_field::Cone;
 pub use gallery::{Gallery, Shot, Target};
 pub use light::{ExposureLight, Light, Reconstruction};
 pub use orders::{Orders, orders};
 pub use picture::{Picture, Scale, read_gray, write_coded_png, write_rgb_png};
+pub use seen::{Colour, Seeing, SeenGallery};
+pub use sharpest::{Sharpest, sharpest};
 
 use crate::error::{Error, Result};
 use crate::field::{Field, Grid, grid};
@@ -182,10 +188,14 @@ fn at_pupil(
     Ok(cut)
 }
 
+/// Samples of a pitch that cover ±half; a length that is whole but for rounding takes none more.
+fn cells(half: f64, pitch: f64) -> f64 {
+    (2.0 * half / pitch - 1e-6).ceil()
+}
+
 /// A centred grid of the field's pitch that covers ±half.
 fn window(field: &Grid, half: DVec2) -> Result<Grid> {
-    let side = |half: f64, pitch: f64| (2.0 * half / pitch).ceil();
-    let (width, height) = (side(half.x, field.pitch_x), side(half.y, field.pitch_y));
+    let (width, height) = (cells(half.x, field.pitch_x), cells(half.y, field.pitch_y));
     // 2²⁰ samples a side are metres of plane: a window beyond is a slip in a unit.
     if !(width >= 1.0 && height >= 1.0 && width <= (1 << 20) as f64 && height <= (1 << 20) as f64) {
         let size = format_args!("half size {} × {} m", half.x, half.y);

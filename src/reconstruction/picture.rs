@@ -118,6 +118,14 @@ pub fn write_coded_png(path: &Path, width: usize, height: usize, rgb: &[u8], tex
     write_png(path, width, height, png::ColorType::Rgb, rgb, texts)
 }
 
+/// What the encoder of a PNG refuses, as the file's error.
+pub(super) fn refused(path: &Path, error: png::EncodingError) -> Error {
+    match error {
+        png::EncodingError::IoError(source) => Error::Io { path: path.into(), source },
+        other => Error::input(path, other.to_string()),
+    }
+}
+
 fn write_png(
     path: &Path,
     width: usize,
@@ -126,11 +134,8 @@ fn write_png(
     bytes: &[u8],
     texts: &[(&str, String)],
 ) -> Result<()> {
-    let refused = |e: png::EncodingError| match e {
-        png::EncodingError::IoError(source) => Error::Io { path: path.into(), source },
-        other => Error::input(path, other.to_string()),
-    };
     files::write_whole(path, |out| {
+        let refused = |e| refused(path, e);
         let mut encoder = png::Encoder::new(out, width as u32, height as u32);
         encoder.set_color(color);
         encoder.set_depth(png::BitDepth::Eight);

@@ -2,8 +2,8 @@
 //! dark (Di Leonardo, Ianni & Ruocco, *Optics Express* 15, 1913 (2007)), a second constraint on the phase (Chang et al.,
 //! *Applied Optics* 54, 6994 (2015)), and free light where nothing counts.
 
-use super::model::PanelModel;
 use super::{Judged, Padding, Problem, Solution, Start, Target, TargetPlane};
+use crate::encode::model::PanelModel;
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Complex64};
 use crate::panel::{Illumination, PanelProfile};

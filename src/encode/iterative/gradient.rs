@@ -6,8 +6,8 @@
 //! the wish ("straight through", Bengio et al., arXiv:1308.3432). On a panel of less than a turn a wish stops at the ends
 //! of the range: in the gap it would move without effect and jump from one end to the other.
 
-use super::model::{Light, PanelModel, Range};
 use super::{Judged, Padding, Problem, Solution, Start, Target};
+use crate::encode::model::{Light, PanelModel, Range};
 use crate::error::{Error, Result};
 use crate::field::Complex32;
 use crate::panel::{Illumination, PanelProfile};

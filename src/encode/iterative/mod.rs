@@ -10,19 +10,18 @@
 
 mod gerchberg_saxton;
 mod gradient;
-mod model;
 mod planes;
 
 pub use gerchberg_saxton::{Constraint, GerchbergSaxton, gerchberg_saxton};
 pub use gradient::{GradientDescent, gradient_descent};
 pub use planes::Padding;
 
+use crate::encode::model::PanelModel;
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Grid};
 use crate::panel::PhasePattern;
 use crate::progress::Progress;
 use crate::random::Random;
-use model::PanelModel;
 use planes::Planes;
 use rayon::prelude::*;
 use std::f32::consts::TAU;

@@ -79,7 +79,7 @@ fn slopes_hold_with_crosstalk_dead_space_and_oblique_light() {
     // Sixteen bits: a difference of phases must be seen through the levels.
     profile.bits = 16;
     profile.responses[0].curve = crate::panel::Curve::Linear { levels_for_2pi: 65536.0 };
-    let model = model::PanelModel::new(&profile, WAVELENGTH, illumination).expect("model");
+    let model = crate::encode::model::PanelModel::new(&profile, WAVELENGTH, illumination).expect("model");
     // Smooth phases away from the ends of the turn: a wrap would blur into a slope that no wish has.
     let start: Vec<f32> =
         (0..grid.len()).map(|i| 3.0 + (0.4 * (i % 26) as f32).sin() + (0.3 * (i / 26) as f32).cos()).collect();

@@ -1,4 +1,5 @@
 use super::*;
+use crate::encode::EncodeOptions;
 use crate::names::Named;
 use crate::panel::{Packing, PanelProfile, SignalLayout};
 use std::time::Duration;
@@ -16,7 +17,7 @@ fn panel() -> PanelProfile {
 fn request() -> Request {
     let encode =
         EncodeOptions { encoding: Some(Encoding::named("double-phase").expect("encoding")), ..Default::default() };
-    Request { turn: [0.0; 2], shift: DVec3::ZERO, wavelength: 632.8e-9, encode }
+    Request { turn: [0.0; 2], shift: DVec3::ZERO, wavelength: 632.8e-9, eye: DVec3::new(0.0, 0.0, 0.6), encode }
 }
 
 fn start(path: &Path, rays: u32) -> (Worker, Vec<PathBuf>) {
@@ -115,6 +116,55 @@ fn a_request_moves_the_hologram_as_it_says() {
     let frame = refined(&worker, version, Detail::Full).frame;
     assert_eq!(frame.metadata.wavelength, 520e-9);
     assert_eq!(frame.metadata.encoding.expect("encoding").method, "kinoform");
+}
+
+/// Share of a frame's light that enters a pupil of 4 mm.
+fn entering(frame: &Frame, eye: DVec3) -> f64 {
+    use crate::light_field::{EyeGrid, Layer, LightField, Look, Viewer};
+    use crate::reconstruction::seen::{Colour, Judge};
+    let viewer = Viewer::at(eye);
+    let eyes = EyeGrid::covering(&viewer, EyeGrid::SPACING).expect("eyes");
+    let window = crate::field::Grid::new(20, 16, 128e-6, 128e-6).expect("window");
+    let light = LightField::of_layers(&[Layer::new(-0.1, |_| 0.5, |_| 1.0)], eyes, window).expect("views");
+    let colour = Colour::One { wavelength: frame.metadata.wavelength, channel: Default::default() };
+    let look = Look { pupil: eye.truncate(), focus: -0.1 };
+    let judge = Judge::new(&light, &viewer, colour, vec![look], &Progress::new()).expect("judge");
+    let lit = pipeline::light(frame, &pipeline::Bench::default(), &Progress::new()).expect("light");
+    let mut seen = judge.begin();
+    seen.add(&judge, &lit.field, None, 0, &Progress::new()).expect("seen");
+    judge.figures(&seen).all.efficiency
+}
+
+#[test]
+fn frames_for_an_eye_go_where_it_goes() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/motion.gltf");
+    let (worker, _) = start(&path, 48);
+    let encode = EncodeOptions { encoding: Some(Encoding::named("view").expect("encoding")), ..Default::default() };
+    let at = |x: f64| Request { eye: DVec3::new(x, 0.0, 0.6), encode: encode.clone(), ..request() };
+    let version = worker.request(at(0.0), false);
+    let first = refined(&worker, version, Detail::Full);
+    assert!(first.field.is_none() && first.frame.metadata.encoding.as_ref().is_some_and(|e| e.method == "view"));
+    // Inside the box whose views are at hand: neither light nor views are made again.
+    let version = worker.request(at(2.5e-3), false);
+    let moved = refined(&worker, version, Detail::Coarse);
+    assert!(moved.light_seconds < 0.2 * first.light_seconds, "{} {}", moved.light_seconds, first.light_seconds);
+    // Far beyond it they are.
+    let version = worker.request(at(12e-3), false);
+    let beyond = refined(&worker, version, Detail::Coarse);
+    let eyes = [0.0, 12e-3].map(|x| DVec3::new(x, 0.0, 0.6));
+    let shares = [&first, &beyond].map(|hologram| eyes.map(|eye| entering(&hologram.frame, eye)));
+    println!("light into the pupil here and there: {shares:.3?}");
+    assert!(shares[0][0] > 3.0 * shares[0][1] && shares[1][1] > 3.0 * shares[1][0], "{shares:?}");
+    // A scene in its window does not move aside.
+    worker.request(Request { shift: DVec3::new(1e-3, 0.0, 0.0), ..at(0.0) }, false);
+    let why = loop {
+        match next(&worker) {
+            WorkerEvent::Failed(why) => break why,
+            WorkerEvent::Ready(_) | WorkerEvent::Cancelled(_) => {}
+            other => panic!("{other:?}"),
+        }
+    };
+    assert!(why.contains("window"), "{why}");
 }
 
 #[test]

@@ -18,7 +18,7 @@ pub(super) struct PanelModel {
     /// Standard deviation of the Gaussian that blends neighbouring pixels' phases [pixels].
     crosstalk: f64,
     /// Light of the dead space, seen along the axis: (1 − F)·d.
-    dead: f32,
+    pub(super) dead: f32,
     /// The wave that falls on each pixel; absent: 1 everywhere.
     incident: Option<Vec<Complex32>>,
     /// Ends between which the panel can move, where it has less than a turn.
@@ -108,6 +108,11 @@ impl PanelModel {
             wishes.par_iter().enumerate().map(|(i, &wish)| lit(i, self.show(wish).1)).unzip()
         };
         Light { total, modulated }
+    }
+
+    /// The light of all pixels where neighbours blend, which no pixel's own wish tells; `None` without crosstalk.
+    pub(super) fn blended(&self, wishes: &[f32]) -> Option<Vec<Complex32>> {
+        (self.crosstalk > 0.0).then(|| self.light(wishes).total)
     }
 
     /// Slopes of what the panel shows as slopes of its pixels' wishes: crosstalk spreads each over its neighbours.

@@ -1,0 +1,94 @@
+//! What an eye sees of an encoded frame when it focuses elsewhere: against the light field, by the judge.
+
+use crate::encode::ViewEncoding;
+use crate::field::Grid;
+use crate::light_field::{Layer, LightField, Look, Retina, Viewer};
+use crate::panel::{PanelProfile, Setup};
+use crate::pipeline::{self, Bench};
+use crate::points::Channel;
+use crate::progress::Progress;
+use crate::reconstruction::Colour;
+use crate::reconstruction::seen::Judge;
+use glam::DVec2;
+
+const NEAR: f64 = -0.1;
+const FAR: f64 = -0.15;
+
+fn setup() -> Setup {
+    Setup::new(PanelProfile::phase(960, 540, 8e-6, 8, 632.8e-9).expect("panel"), None).expect("setup")
+}
+
+/// Pictures that should be seen and pictures that are, on one lattice.
+struct Looked {
+    retina: Grid,
+    wanted: Vec<Vec<f32>>,
+    seen: Vec<Vec<f32>>,
+}
+
+fn look(layers: &[Layer], viewer: &Viewer, iterations: usize, looks: Vec<Look>) -> Looked {
+    let (setup, progress) = (setup(), Progress::new());
+    let retina = Retina::of(viewer, &setup.grid, setup.wavelength).expect("retina");
+    let half = 0.5 * DVec2::new(setup.grid.extent_x(), setup.grid.extent_y());
+    let eyes = retina.eyes(viewer).expect("eyes");
+    let light = LightField::of_layers(layers, eyes, retina.window(half).expect("window")).expect("views");
+    let exposures = pipeline::exposures(&setup, &pipeline::Settings::default(), None);
+    let view = ViewEncoding { iterations: Some(iterations), ..ViewEncoding::default() };
+    let found = pipeline::views(&light, viewer, &exposures, &setup, &view, &[], &progress).expect("frames");
+    let colour = Colour::of(None, setup.wavelength, Channel::Luminance);
+    let number = looks.len();
+    let judge = Judge::new(&light, viewer, colour, looks, &progress).expect("judge");
+    let mut seen = judge.begin();
+    for encoded in found.iter().flatten().flat_map(|viewed| &viewed.frames) {
+        let lit = pipeline::light(&encoded.frame, &Bench::default(), &progress).expect("light");
+        seen.add(&judge, &lit.field, lit.settings.aperture.as_ref(), 0, &progress).expect("seen");
+    }
+    Looked {
+        retina: *judge.retina(),
+        wanted: (0..number).map(|look| judge.wanted(look).luminance().values).collect(),
+        seen: (0..number).map(|look| judge.seen(&seen, look).luminance().values).collect(),
+    }
+}
+
+/// An edge out of focus is as wide as it should be, and does not ring.
+#[test]
+fn an_edge_out_of_focus_is_blurred_as_in_the_light_field() {
+    let layers =
+        [Layer::new(NEAR, |_| 0.8, |p| if p.x > 0.3e-3 { 1.0 } else { 0.0 }), Layer::new(FAR, |_| 0.2, |_| 1.0)];
+    let viewer = Viewer::default();
+    let looks = [FAR, NEAR].map(|focus| Look { pupil: DVec2::ZERO, focus }).to_vec();
+    let found = look(&layers, &viewer, 150, looks);
+    let retina = &found.retina;
+    // The mean of the rows in the middle half of the picture, across the edge.
+    let profile = |picture: &[f32]| -> Vec<f64> {
+        let rows = retina.height / 4..3 * retina.height / 4;
+        let mean = |column: usize| {
+            rows.clone().map(|row| f64::from(picture[row * retina.width + column])).sum::<f64>() / rows.len() as f64
+        };
+        let from = retina.column(-1.8e-3) as usize;
+        (from..=retina.column(2.2e-3) as usize).map(mean).collect()
+    };
+    let (wanted, seen) = (profile(&found.wanted[0]), profile(&found.seen[0]));
+    let level = |values: &[f64], dark: bool| {
+        let ends = if dark { &values[..values.len() / 5] } else { &values[4 * values.len() / 5..] };
+        ends.iter().sum::<f64>() / ends.len() as f64
+    };
+    let width = |values: &[f64]| {
+        let (low, high) = (level(values, true), level(values, false));
+        let crossing = |share: f64| {
+            let limit = low + share * (high - low);
+            let at = values.windows(2).position(|pair| pair[0] < limit && pair[1] >= limit).expect("an edge");
+            at as f64 + (limit - values[at]) / (values[at + 1] - values[at])
+        };
+        (crossing(0.85) - crossing(0.15)) * retina.pitch_x
+    };
+    let (width_wanted, width_seen) = (width(&wanted), width(&seen));
+    let edge = level(&wanted, false) - level(&wanted, true);
+    let ringing = wanted.iter().zip(&seen).map(|(w, s)| (s - w).abs() / edge).fold(0.0, f64::max);
+    println!("blur: {:.0} µm, {:.0} µm wanted; ringing {:.3}", 1e6 * width_seen, 1e6 * width_wanted, ringing);
+    assert!((width_seen / width_wanted - 1.0).abs() < 0.1, "{width_seen}, not {width_wanted}");
+    // Of a panel half as wide and high as that of the figures, 3.0 %.
+    assert!(ringing < 0.035, "{ringing}");
+    // In focus the same edge is as sharp as the pupil's diffraction lets it be, λZ/D = 95 µm.
+    let sharp = width(&profile(&found.seen[1]));
+    assert!(sharp < 1.3 * 95e-6, "{sharp}");
+}
