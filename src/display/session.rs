@@ -88,7 +88,8 @@ impl Display {
         }
         let event_loop = builder.build().map_err(|error| Error::Display {
             what: format!(
-                "no display server can be reached: {error}; run inside a desktop session, or set DISPLAY or WAYLAND_DISPLAY"
+                "no display server can be reached: {}; run inside a desktop session, or set DISPLAY or WAYLAND_DISPLAY",
+                plain(&error.to_string())
             ),
         })?;
         let owned = event_loop.owned_display_handle();
@@ -277,5 +278,25 @@ impl<F: FnOnce(&ActiveEventLoop)> ApplicationHandler for Handler<'_, F> {
         if let Some(action) = self.action.take() {
             action(event_loop);
         }
+    }
+}
+
+/// An error of the window system's library without the place in its source that it begins with.
+fn plain(said: &str) -> &str {
+    let found = said.match_indices(".rs:").last().and_then(|(at, mark)| said[at + mark.len()..].split_once(": "));
+    let words = found.filter(|(line, _)| line.parse::<u32>().is_ok()).map_or(said, |(_, words)| words);
+    words.trim_end_matches('.')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::plain;
+
+    #[test]
+    fn places_in_sources_are_left_off() {
+        let said =
+            "os error at /root/.cargo/winit-0.30/src/linux/mod.rs:765: neither DISPLAY nor WAYLAND_DISPLAY is set.";
+        assert_eq!(plain(said), "neither DISPLAY nor WAYLAND_DISPLAY is set");
+        assert_eq!(plain("no display: gone"), "no display: gone");
     }
 }

@@ -50,7 +50,7 @@ impl Frame {
     /// is given.
     pub fn read(path: &Path, profile: Option<&PanelProfile>, wavelength: Option<f64>) -> Result<(Self, Vec<String>)> {
         let bytes = std::fs::read(path).map_err(Error::io(path))?;
-        let (picture, metadata) = decode(path, &bytes)?;
+        let (picture, metadata) = decode(path, &bytes, profile)?;
         let mut warnings = Vec::new();
         let mut metadata = match (metadata, profile) {
             (Some(metadata), _) => metadata,
@@ -114,7 +114,7 @@ impl VideoFrame {
         if layout.packing.frames() == 1 {
             return Ok(None);
         }
-        let (picture, metadata) = decode(path, &bytes)?;
+        let (picture, metadata) = decode(path, &bytes, Some(&panel))?;
         let packed = metadata.as_ref().and_then(|m| m.applied.packing.as_deref());
         let rgb = match picture {
             Picture::Rgb { width, height, rgb }
@@ -187,11 +187,31 @@ enum Picture {
     Rgb { width: usize, height: usize, rgb: Vec<u8> },
 }
 
-fn decode(path: &Path, bytes: &[u8]) -> Result<(Picture, Option<FrameMetadata>)> {
+/// Refuses a picture by its header, before memory is taken for its pixels: of neither the size of the panel nor of its
+/// signal, or of no known panel.
+fn check_size(path: &Path, size: [u32; 2], profile: Option<&PanelProfile>) -> Result<()> {
+    let Some(profile) = profile else {
+        return Err(Error::input(path, "the picture does not say for which panel it is; name the panel"));
+    };
+    let size = size.map(|side| side as usize);
+    let signal = [profile.signal.width, profile.signal.height];
+    if size == [profile.width, profile.height] || size == signal {
+        return Ok(());
+    }
+    let ([width, height], panel) = (size, [profile.width, profile.height]);
+    let what = format!("the picture is {width}×{height}; panel {} has {}×{}", profile.name, panel[0], panel[1]);
+    Err(Error::input(path, what))
+}
+
+/// The picture and what it says of itself; `profile` is the panel that it is read for, where that is known.
+fn decode(path: &Path, bytes: &[u8], profile: Option<&PanelProfile>) -> Result<(Picture, Option<FrameMetadata>)> {
     let mut metadata = None;
     if bytes.starts_with(b"\x89PNG") {
         let fail = |e: png::DecodingError| Error::input(path, format!("not a readable PNG: {e}"));
         let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().map_err(fail)?;
+        let before = text_chunk(path, reader.info())?;
+        let header = [reader.info().width, reader.info().height];
+        check_size(path, header, profile.or(before.as_ref().map(|metadata| &metadata.panel)))?;
         let size = reader.output_buffer_size().ok_or_else(|| Error::input(path, "the picture is too large"))?;
         let mut data = vec![0; size];
         let info = reader.next_frame(&mut data).map_err(fail)?;
@@ -208,8 +228,11 @@ fn decode(path: &Path, bytes: &[u8]) -> Result<(Picture, Option<FrameMetadata>)>
             return Ok((Picture::Gray { width, height, white, values }, metadata));
         }
     }
-    let image =
-        image::load_from_memory(bytes).map_err(|e| Error::input(path, format!("not a readable picture: {e}")))?;
+    let unreadable = |e: image::ImageError| Error::input(path, format!("not a readable picture: {e}"));
+    let open = || image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(Error::io(path));
+    let (width, height) = open()?.into_dimensions().map_err(unreadable)?;
+    check_size(path, [width, height], profile.or(metadata.as_ref().map(|m: &FrameMetadata| &m.panel)))?;
+    let image = open()?.decode().map_err(unreadable)?;
     let (width, height) = (image.width() as usize, image.height() as usize);
     let picture = match image {
         image::DynamicImage::ImageLuma8(gray) => {
@@ -247,8 +270,11 @@ fn text_chunk(path: &Path, info: &png::Info<'_>) -> Result<Option<FrameMetadata>
             None => return Ok(None),
         },
     };
-    let metadata = serde_json::from_str(&text)
+    let metadata: FrameMetadata = serde_json::from_str(&text)
         .map_err(|e| Error::input(path, format!("its metadata is damaged ({e}); write the frame again")))?;
+    metadata
+        .check()
+        .map_err(|what| Error::input(path, format!("its metadata is wrong ({what}); write the frame again")))?;
     Ok(Some(metadata))
 }
 
@@ -385,6 +411,7 @@ mod tests {
         refused("colour", &eight);
         image::GrayImage::new(8, 5).save(&path).expect("save");
         refused("8×5", &eight);
+        image::GrayImage::new(7, 5).save(&path).expect("save");
         let whole = std::fs::read(&path).expect("bytes");
         std::fs::write(&path, &whole[..whole.len() - 20]).expect("truncate");
         refused("readable", &eight);

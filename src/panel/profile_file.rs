@@ -60,18 +60,11 @@ impl PanelProfile {
 fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
     let at = ConfigFile { source };
     let file: ProfileFile = at.parse(text)?;
-    if file.width == 0 || file.height == 0 || file.width > 1 << 16 || file.height > 1 << 16 {
-        return at.refuse(format!("width × height = {}×{} must be 1 … 65536 each", file.width, file.height));
-    }
-    if file.fill_factor == 0.0 {
-        return at.refuse("fill_factor = 0 leaves nothing that modulates; it must be above 0 and at most 1");
-    }
-    if !(0.0..=8.0).contains(&file.crosstalk) {
-        return at.refuse(format!("crosstalk = {} must be 0 … 8 pixels", file.crosstalk));
-    }
+    // Before tables of so many levels are read.
     if !(1..=16).contains(&file.bits) {
         return at.refuse(format!("bits = {} must be 1 … 16", file.bits));
     }
+    // Before the signal is found too narrow for them.
     if file.kind == PanelKind::BinaryDmd && file.bits != 1 {
         return at
             .refuse(format!("bits = {} on a binary-dmd: its mirrors have two positions, write bits = 1", file.bits));
@@ -124,7 +117,7 @@ fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
     if !corrections.is_empty() && modulation == Modulation::Amplitude {
         return at.refuse("a [[correction]] needs a panel that modulates phase");
     }
-    Ok(PanelProfile {
+    let profile = PanelProfile {
         source: source.to_path_buf(),
         name: file.name,
         maker: file.maker,
@@ -146,7 +139,8 @@ fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
         corrections,
         crosstalk: file.crosstalk,
         unverified: file.unverified,
-    })
+    };
+    profile.check().map(|()| profile).or_else(|what| at.refuse(what))
 }
 
 fn signal(

@@ -371,7 +371,8 @@ pub fn illuminate(samples: &mut [Complex32], grid: Grid, wavelength: f64, illumi
         let axes = [(frequency[0], grid.limit_x(), grid.pitch_x), (frequency[1], grid.limit_y(), grid.pitch_y)];
         for (f, limit, pitch) in axes {
             if f.abs() > limit * (1.0 + 1e-9) {
-                let hint = "take a smaller angle, or more subsamples a pixel".into();
+                let largest = (wavelength * limit).min(1.0).asin().to_degrees();
+                let hint = format!("at most {largest:.2}deg along that axis here, or more subsamples a pixel");
                 return Err(Error::Undersampled { what: "illumination", frequency: f.abs(), limit, pitch, hint });
             }
         }

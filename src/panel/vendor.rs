@@ -33,8 +33,19 @@ pub(crate) fn text(path: &Path) -> Result<String> {
 /// [`Error::Calibration`] when the file is no 8-bit gray picture.
 pub fn wavefront_picture(path: &Path, wavelength: Option<f64>) -> Result<Wavefront> {
     let bytes = self::bytes(path)?;
-    let picture = image::load_from_memory(&bytes)
-        .map_err(|e| Error::calibration(path, format!("not a readable picture: {e}")))?;
+    let unreadable = |e: image::ImageError| Error::calibration(path, format!("not a readable picture: {e}"));
+    let format = image::guess_format(&bytes).map_err(unreadable)?;
+    // A name that says bitmap over a TIFF is a damaged file, and TIFF's reader is the least strict.
+    let named = path.extension().and_then(image::ImageFormat::from_extension);
+    if format == image::ImageFormat::Tiff && named != Some(format) {
+        return Err(Error::calibration(path, "is a TIFF by its content and not by its name; rename it"));
+    }
+    let mut reader = image::ImageReader::with_format(std::io::Cursor::new(&bytes), format);
+    let mut limits = image::Limits::default();
+    // Four bytes for each pixel of the largest panel that is sold, and as many for the decoder.
+    limits.max_alloc = Some(LARGEST);
+    reader.limits(limits);
+    let picture = reader.decode().map_err(unreadable)?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     let gray: Vec<u8> = match picture {
         image::DynamicImage::ImageLuma8(gray) => gray.into_raw(),

@@ -64,7 +64,40 @@ pub struct Verified {
 }
 
 fn find(folder: &Path) -> Option<PathBuf> {
-    [PLATE, PARTIAL].iter().map(|name| folder.join(name)).find(|path| path.is_file())
+    // Links count too: they are refused by name, not gone round.
+    [PLATE, PARTIAL].iter().map(|name| folder.join(name)).find(|path| path.symlink_metadata().is_ok())
+}
+
+/// Refuses a name that is taken by a link or by something else than a file: what it points to is not the plate's.
+fn refuse_link(path: &Path) -> Result<()> {
+    match path.symlink_metadata() {
+        Ok(there) if !there.is_file() => {
+            let kind = if there.is_symlink() { "a link" } else { "no file" };
+            Err(Error::input(path, format!("is {kind}, and a plate is not written through it; remove it")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Opens a plate's file to read and write it: one that is there, never through a link, or a new one.
+fn open_own(path: &Path) -> Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true).write(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, libc::O_NOFOLLOW | libc::O_NONBLOCK);
+    for _ in 0..2 {
+        refuse_link(path)?;
+        match options.clone().create_new(true).open(path) {
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
+            other => return other.map_err(Error::io(path)),
+        }
+        match options.open(path) {
+            // Another process has just given it its last name.
+            Err(e) if e.kind() == ErrorKind::NotFound => {}
+            other => return other.map_err(Error::io(path)),
+        }
+    }
+    Err(Error::input(path, "comes and goes; is another print at work on the same part?"))
 }
 
 /// Refuses a folder that holds another plate, or a plate's file that belongs to none; returns the manifest if there is one.
@@ -84,6 +117,9 @@ pub(super) fn look(folder: &Path, settings: &Settings) -> Result<Option<Manifest
 /// Hashes in the lists of a folder; lines that were cut off count for nothing.
 fn listed(folder: &Path, tiles: u64) -> Result<BTreeMap<u64, String>> {
     let lists = folder.join(LISTS);
+    if lists.is_symlink() {
+        return Err(Error::input(&lists, "is a link, and lists of tiles are not kept behind one; remove it"));
+    }
     let mut found = BTreeMap::new();
     let entries = match fs::read_dir(&lists) {
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(found),
@@ -139,8 +175,7 @@ pub(super) fn compute(
     let layout = Layout::new(&fringes.plate);
     let range = shard.tiles(layout.tiles);
     let path = find(folder).unwrap_or_else(|| folder.join(PARTIAL));
-    let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
-    let file = file.map_err(Error::io(&path))?;
+    let file = open_own(&path)?;
     let prepared = (|| {
         // The same bytes by whoever comes first or later; the length never shrinks a file that others write.
         if file.metadata().map_err(Error::io(&path))?.len() != layout.length() {
@@ -190,7 +225,9 @@ pub(super) fn compute(
             }
             let kept = done.kept + done.computed;
             let written = (|| {
-                write_at(&file, &path, layout.offset(index), &bytes)?;
+                let mut padded = bytes;
+                padded.resize(layout.stride as usize, 0);
+                write_at(&file, &path, layout.offset(index), &padded)?;
                 file.sync_data().map_err(Error::io(&path))?;
                 // One write, so that a list's last line is whole or recognisably cut off.
                 list.write_all(format!("{index} {hash}\n").as_bytes()).map_err(Error::io(&list_path))?;
@@ -220,8 +257,11 @@ pub(super) fn compute(
     Ok(done)
 }
 
+/// Whether a tile has its hash, and zeros behind it.
 fn is_whole(file: &File, path: &Path, layout: &Layout, index: u64, hash: &str) -> Result<bool> {
-    Ok(sha256(&read_at(file, path, layout.offset(index), layout.tile_bytes)?) == hash)
+    let bytes = read_at(file, path, layout.offset(index), layout.stride)?;
+    let (tile, behind) = bytes.split_at(layout.tile_bytes as usize);
+    Ok(behind.iter().all(|&byte| byte == 0) && sha256(tile) == hash)
 }
 
 /// Checks all tiles once more, gives the file its name and the manifest the hashes.
@@ -281,6 +321,7 @@ pub(super) fn open(folder: &Path) -> Result<(Manifest, Layout, File, PathBuf)> {
         return Err(Error::input(folder.join(manifest::NAME), what));
     }
     let path = folder.join(PLATE);
+    refuse_link(&path)?;
     let file = File::open(&path).map_err(Error::io(&path))?;
     let length = file.metadata().map_err(Error::io(&path))?.len();
     if length != layout.length() {

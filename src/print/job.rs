@@ -9,7 +9,8 @@ use super::shard::Shard;
 use crate::error::{Error, Result};
 use crate::hologram::InstructionSet;
 use crate::progress::Progress;
-use crate::segments::{Object, ObjectWave, SceneOptions};
+use crate::scene::gltf::is_scene;
+use crate::segments::{Object, ObjectWave, SceneOptions, is_cloud};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 pub struct PrintSettings {
     /// The plate.
     pub plate: Plate,
-    /// A scene (.gltf, .glb), or points (.ply).
+    /// A scene (glTF, OBJ, STL), or points (a cloud).
     pub input: PathBuf,
     /// How a scene is lit.
     pub options: SceneOptions,
@@ -62,8 +63,11 @@ impl PlateJob {
     /// with kernels that this machine does not have; as [`Plate::segments`] and [`Object::read`].
     pub fn new(asked: PrintSettings, progress: &Progress) -> Result<Self> {
         let PrintSettings { plate, input, mut options, folder, shard, dry_run } = asked;
-        if !["gltf", "glb", "ply"].iter().any(|kind| input.extension().is_some_and(|e| e.eq_ignore_ascii_case(kind))) {
-            return Err(Error::input(input, "is no scene (.gltf, .glb) or point cloud (.ply)"));
+        if !is_cloud(&input) && !is_scene(&input) {
+            return Err(Error::input(
+                input,
+                "is no scene (.gltf, .glb, .obj, .stl) or point cloud (.ply, .xyz, .pcd, .las)",
+            ));
         }
         let settings = Settings::new(&plate, &input, &options)?;
         let manifest = if dry_run { None } else { folder::look(&folder, &settings)? };

@@ -128,6 +128,11 @@ impl Manifest {
         }
         let manifest: Self = serde_json::from_str(&text)
             .map_err(|e| Error::input(&path, format!("is no manifest of a plate, or damaged: {e}")))?;
+        let damaged = |what: String| Error::input(&path, format!("is no manifest of a plate, or damaged: {what}"));
+        manifest.settings.plate.check().map_err(damaged)?;
+        if !(manifest.amplitude > 0.0 && manifest.amplitude.is_finite() && manifest.white.is_finite()) {
+            return Err(damaged("its amplitude or its white is no number".to_owned()));
+        }
         Ok(Some(manifest))
     }
 

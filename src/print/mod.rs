@@ -20,6 +20,7 @@ mod manifest;
 mod parallax_tests;
 mod plan;
 mod plate;
+mod plate_check;
 mod plate_file;
 pub mod preview;
 mod reader;

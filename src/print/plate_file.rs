@@ -81,9 +81,6 @@ struct SlitFile {
     wavelengths: Option<Vec<String>>,
 }
 
-/// Longest side of a plate [px]: 2.6 million would be 0.9 m at 0.35 µm.
-const LONGEST: u64 = 1 << 22;
-
 impl Plate {
     /// Reads a plate from a TOML file.
     ///
@@ -112,12 +109,6 @@ impl Plate {
             }
             _ => return at.refuse("give either size = [columns, rows] or extent = [\"65mm\", \"65mm\"]"),
         };
-        if !(1..=LONGEST).contains(&width) || !(1..=LONGEST).contains(&height) {
-            return at.refuse(format!("{width}×{height} pixels: each side must be 1 to {LONGEST}"));
-        }
-        if !matches!(file.bits, 1 | 8) {
-            return at.refuse(format!("bits = {} must be 1 or 8", file.bits));
-        }
         if file.bits == 8 && file.binarisation.is_some() {
             return at.refuse("binarisation is for bits = 1; leave it out");
         }
@@ -125,27 +116,8 @@ impl Plate {
         if file.bits == 1 && file.quantity != Quantity::Bipolar && binarisation == Binarisation::PulseWidth {
             return at.refuse("pulse-width makes its fringe from u·r* itself; take quantity = \"bipolar\"");
         }
-        if !matches!(file.rotation, 0 | 90 | 180 | 270) {
-            return at.refuse(format!("rotation = {} must be 0, 90, 180 or 270", file.rotation));
-        }
         let tile = file.tile.unwrap_or(2048);
-        if !tile.is_multiple_of(64) || !(64..=8192).contains(&tile) {
-            return at.refuse(format!("tile = {tile} must be a multiple of 64 from 64 to 8192"));
-        }
-        if tile > width || tile > height {
-            let what = format!("the plate of {width}×{height} pixels is smaller than a tile of {tile}; lower tile");
-            return at.refuse(what);
-        }
         let segment = file.segment.unwrap_or(1024.min(tile));
-        if !(16..=tile).contains(&segment) {
-            return at.refuse(format!("segment = {segment} must be 16 to the tile's {tile}"));
-        }
-        if file.guard * 2 >= width.min(height) {
-            return at.refuse(format!("guard = {} on each side leaves no fringes of {width}×{height}", file.guard));
-        }
-        if file.marks > file.guard {
-            return at.refuse(format!("marks = {} do not fit into guard = {}; raise guard", file.marks, file.guard));
-        }
         let reference = match &file.reference {
             None => Reference::None,
             Some(ReferenceFile { angle: Some([x, y]), point: None, side }) => Reference::Plane {
@@ -180,7 +152,8 @@ impl Plate {
         let slit = match &file.slit {
             None => None,
             Some(slit) => {
-                let as_fine_as_the_eye = (viewer * resolution.tan() / pitch_y).clamp(16.0, tile as f64) as u64;
+                let as_fine_as_the_eye =
+                    (viewer * resolution.tan() / pitch_y).clamp(16.0, (tile as f64).max(16.0)) as u64;
                 let strip = slit.strip.unwrap_or(1 << as_fine_as_the_eye.ilog2());
                 if !(8..=tile).contains(&strip) {
                     return at.refuse(format!("slit.strip = {strip} must be 8 to the tile's {tile}"));
@@ -216,7 +189,7 @@ impl Plate {
         if scene.scale.is_some_and(|scale| !(scale.is_finite() && scale > 0.0)) {
             return at.refuse("scene.scale must be greater than zero");
         }
-        Ok(Self {
+        let plate = Self {
             name: file.name,
             raster: Raster { width, height, pitch_x, pitch_y },
             wavelength,
@@ -253,7 +226,8 @@ impl Plate {
             object_angle,
             error: at.within("error", file.error.unwrap_or(if file.bits == 1 { 1e-2 } else { 5e-3 }), 1e-4..=0.1)?,
             seed: file.seed,
-        })
+        };
+        plate.check().map(|()| plate).or_else(|what| at.refuse(what))
     }
 }
 

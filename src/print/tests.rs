@@ -334,6 +334,15 @@ fn torn_tiles_are_found_and_redone_and_other_plates_refused() {
     let repaired = folder::compute(path, &fringes, &complete, Shard::default(), &Progress::new()).expect("repaired");
     assert_eq!((repaired.torn, repaired.computed, repaired.complete), (1, 1, true));
     assert_eq!(fs::read(path.join("plate.tif")).expect("plate"), bytes);
+    // A bit of what lies between tiles, and between the head and the first.
+    for at in [layout.offset(3) - 1, layout.offset(0) - 1, layout.offset(14) + layout.tile_bytes] {
+        let file = fs::OpenOptions::new().write(true).open(path.join("plate.tif")).expect("file");
+        tiff::write_at(&file, path, at, &[1]).expect("bit");
+        let torn = folder::verify(path, &Progress::new()).expect_err("a flipped bit").to_string();
+        assert!(torn.contains("again"), "{torn}");
+        folder::compute(path, &fringes, &complete, Shard::default(), &Progress::new()).expect("repaired");
+        assert_eq!(fs::read(path.join("plate.tif")).expect("plate"), bytes);
+    }
     // Another plate in the same folder.
     let other = Settings {
         plate: Plate { fringe: FringeSettings { bias: 0.4, ..plate.fringe }, ..plate.clone() },
@@ -342,4 +351,54 @@ fn torn_tiles_are_found_and_redone_and_other_plates_refused() {
     let refused = folder::look(path, &other).unwrap_err().to_string();
     assert!(refused.contains("plate.bias is 0.5 there, 0.4 here"), "{refused}");
     assert!(folder::look(path, &settings).expect("the same").is_some());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_plate_is_never_written_through_a_link() {
+    let folder = tempfile::tempdir().expect("folder");
+    let plate = plate("[128, 128]", "bits = 8\ntile = 64", "angle = [\"9deg\", \"0deg\"]");
+    let fringes = fringes(&plate, Object::Points(cloud(3)));
+    let victim = folder.path().join("victim");
+    fs::write(&victim, "precious").expect("victim");
+    for name in [".plate.tif.partial", "plate.tif", ".tiles"] {
+        let path = folder.path().join(name.trim_start_matches('.'));
+        let manifest = Manifest {
+            settings: settings(&plate),
+            instruction_set: "x".into(),
+            amplitude: 4.0,
+            white: 0.0,
+            tiles: None,
+        };
+        let manifest = folder::begin(&path, &manifest).expect("manifest");
+        std::os::unix::fs::symlink(&victim, path.join(name)).expect("link");
+        let refused = folder::compute(&path, &fringes, &manifest, Shard::default(), &Progress::new());
+        assert!(refused.expect_err(name).to_string().contains("link"), "{name}");
+        assert_eq!(fs::read(&victim).expect("victim"), b"precious");
+    }
+}
+
+#[test]
+fn a_manifest_of_absurd_numbers_is_refused_before_anything_is_made_of_it() {
+    let folder = tempfile::tempdir().expect("folder");
+    let right = plate("[128, 128]", "bits = 8\ntile = 64", "angle = [\"9deg\", \"0deg\"]");
+    let manifest = folder_of(&right, cloud(3), folder.path(), 4.0);
+    let path = folder.path().join("manifest.json");
+    let text = serde_json::to_string(&manifest).expect("text");
+    for (from, to) in [
+        ("\"tile\":64", "\"tile\":0"),
+        ("\"width\":128", "\"width\":4000000000000"),
+        ("\"width\":128", "\"width\":0"),
+        ("\"bits\":8", "\"bits\":7"),
+        ("\"segment\":64", "\"segment\":0"),
+        ("\"rotation\":0", "\"rotation\":45"),
+        ("\"guard\":0", "\"guard\":18446744073709551615"),
+        ("\"amplitude\":4.0", "\"amplitude\":-1.0"),
+    ] {
+        let spoilt = text.replace(from, to);
+        assert_ne!(spoilt, text, "{from}");
+        fs::write(&path, spoilt).expect("manifest");
+        let refused = folder::verify(folder.path(), &Progress::new()).expect_err(to).to_string();
+        assert!(refused.contains("damaged") && !refused.contains('\n'), "{refused}");
+    }
 }

@@ -17,12 +17,12 @@ const ALIGN: u64 = 4096;
 /// Where everything stands in the file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Layout {
-    /// Header, tags and lists of tiles.
+    /// Header, tags and lists of tiles, and zeros up to the first tile.
     pub(super) head: Vec<u8>,
     /// Bytes of one tile.
     pub(super) tile_bytes: u64,
-    /// From one tile to the next [bytes].
-    stride: u64,
+    /// From one tile to the next [bytes]; what lies between is zero.
+    pub(super) stride: u64,
     /// Number of tiles.
     pub(super) tiles: u64,
     first: u64,
@@ -131,7 +131,9 @@ impl Layout {
             head
         };
         let first = (build(0).len() as u64).next_multiple_of(ALIGN);
-        Self { head: build(first), tile_bytes, stride, tiles, first }
+        let mut head = build(first);
+        head.resize(first as usize, 0);
+        Self { head, tile_bytes, stride, tiles, first }
     }
 
     /// Where a tile begins [bytes].

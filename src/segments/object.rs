@@ -6,7 +6,7 @@ use super::slit::{LinePoint, Strip};
 use crate::error::{Error, Result};
 use crate::illumination::{Illumination, IlluminationSettings};
 use crate::points::colour::Lasers;
-use crate::points::{Channel, PointSource, ply};
+use crate::points::{Channel, PointSource, clouds, ply};
 use crate::progress::Progress;
 use crate::scene::{SceneBvh, gltf};
 use serde::{Deserialize, Serialize};
@@ -34,6 +34,9 @@ pub struct SceneOptions {
     pub time: f64,
     /// Whether light from the viewer is added.
     pub viewer_light: bool,
+    /// Whether the file's URIs may point outside of its folder.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub allow_outside: bool,
     /// Most mirrors and glass surfaces on a path.
     pub bounces: u32,
     /// Photons for caustics.
@@ -45,17 +48,26 @@ pub struct SceneOptions {
 impl Default for SceneOptions {
     fn default() -> Self {
         let IlluminationSettings { bounces, photons, .. } = IlluminationSettings::default();
-        Self { camera: None, animation: None, time: 0.0, viewer_light: false, bounces, photons, white: None }
+        Self {
+            camera: None,
+            animation: None,
+            time: 0.0,
+            viewer_light: false,
+            allow_outside: false,
+            bounces,
+            photons,
+            white: None,
+        }
     }
 }
 
-/// Whether a file is a point cloud.
+/// Whether a file is a point cloud, and no scene.
 pub(crate) fn is_cloud(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"))
+    clouds::is_cloud(path) && !gltf::is_scene(path)
 }
 
 impl Object {
-    /// Reads points (.ply), or lights a scene (.gltf, .glb) and places it.
+    /// Reads points (a cloud), or lights a scene and places it.
     ///
     /// # Errors
     /// Those of the file, its light and its placement; [`Error::Input`] for one without light.
@@ -72,6 +84,7 @@ impl Object {
                 .map_or(gltf::Clip::First, |name| gltf::Clip::Of(gltf::Choice::from(name))),
             time: options.time,
             viewer_light: options.viewer_light,
+            allow_outside: options.allow_outside,
             ..gltf::LoadOptions::default()
         };
         let loaded = gltf::load(path, &load)?;
@@ -80,7 +93,9 @@ impl Object {
         let SceneOptions { bounces, photons, white, .. } = *options;
         let settings = IlluminationSettings { bounces, photons, seed: plane.seed, ..IlluminationSettings::default() };
         let light = Illumination::new(bvh, settings, progress)?;
-        if light.is_dark() {
+        // What is unlit shines by itself, and nothing lights it.
+        let unlit = light.bvh().scene().materials.iter().any(|material| material.unlit);
+        if light.is_dark() && !unlit {
             return Err(Error::input(path, "its lights give no light; raise their intensity or emission"));
         }
         let placed = PlacedScene::new(light, camera, plane, white, bounces, progress)?;
@@ -88,7 +103,7 @@ impl Object {
     }
 
     fn cloud(path: &Path, plane: &Segments) -> Result<Self> {
-        let read = ply::read(path)?;
+        let read = clouds::read(path)?;
         if read.metadata.as_ref().is_some_and(|m| m.frame == ply::Frame::World) {
             let what = "its points stand in the scene's own metres; write them in the hologram frame";
             return Err(Error::input(path, what));

@@ -32,6 +32,10 @@ pub struct Work {
     pub points: u64,
     /// Point–pixel pairs.
     pub pairs: f64,
+    /// Largest bound on the relative error of a segment's field, none below what was measured of it; not of a slit's.
+    pub error_bound: f64,
+    /// Segments' fields whose bound passes what was asked.
+    pub inexact: u64,
     /// Time for rays and points [s].
     pub points_seconds: f64,
     /// Time for the field [s].
@@ -46,6 +50,8 @@ impl AddAssign for Work {
         self.segments += other.segments;
         self.points += other.points;
         self.pairs += other.pairs;
+        self.error_bound = self.error_bound.max(other.error_bound);
+        self.inexact += other.inexact;
         self.points_seconds += other.points_seconds;
         self.field_seconds += other.field_seconds;
         self.fringe_seconds += other.fringe_seconds;
@@ -157,6 +163,8 @@ impl ObjectWave {
             let plan = hologram::plan(&points, &grid, plane.wavelength, &settings)?;
             let computed = hologram::compute(&points, &grid, plane.wavelength, &plan, &quiet)?;
             work.pairs += computed.report.coverage.pairs;
+            work.error_bound = work.error_bound.max(computed.report.error_bound);
+            work.inexact += u64::from(computed.report.error_bound > plane.error);
             for (i, samples) in computed.field.samples.chunks_exact(grid.width).enumerate() {
                 let row = (first[1] + i as i64 * down - rect.y[0]) as usize;
                 let start = row * rect.width() + (first[0] - rect.x[0]) as usize;

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use std::io;
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -71,7 +71,7 @@ impl Server {
             patience: settings.patience,
             settle: settings.settle,
             calibrated: settings.calibrated,
-            held: AtomicUsize::new(0),
+            queues: Default::default(),
             frames: sender,
             #[cfg(unix)]
             local: socket,
@@ -219,18 +219,30 @@ fn reachable(mut address: SocketAddr) -> SocketAddr {
     address
 }
 
-/// Takes a client in, in a thread of its own; if there are too many, cuts off the longest silent one.
+/// Takes a client in, in a thread of its own; if there are too many, cuts off the longest silent one of its kind.
 fn start_client(shared: &Arc<Shared>, stream: Stream, protocol: Protocol) {
     let number = shared.count(CONNECTIONS);
     let Ok(handle) = stream.try_clone() else { return };
-    let (heard, answering) = (Mutex::new(Instant::now()), AtomicBool::new(false));
-    let client = Arc::new(Client { number, stream: handle, heard, answering });
+    let client = Arc::new(Client {
+        number,
+        is_local: !matches!(stream, Stream::Tcp(_)),
+        stream: handle,
+        heard: Mutex::new(Instant::now()),
+        answering: AtomicBool::new(false),
+        proven: AtomicBool::new(false),
+        request: Mutex::new(None),
+    });
     {
         let mut clients = shared.clients();
-        if clients.len() >= shared.connections {
+        // Each kind has room of its own: whoever may open a port cannot push out who may open the socket.
+        let alike = |other: &Client| other.is_local == client.is_local;
+        if clients.iter().filter(|other| alike(other)).count() >= shared.connections {
             shared.count(REFUSED);
-            let silent = clients.iter().enumerate().filter(|(_, client)| !client.answering.load(Ordering::SeqCst));
-            let Some((silent, _)) = silent.min_by_key(|(_, client)| client.heard()) else { return };
+            let silent = clients.iter().enumerate();
+            let silent = silent.filter(|(_, other)| alike(other) && !other.answering.load(Ordering::SeqCst));
+            // Those first that have never shown anything.
+            let order = |other: &Client| (other.proven.load(Ordering::SeqCst), other.heard());
+            let Some((silent, _)) = silent.min_by_key(|(_, other)| order(other)) else { return };
             clients.remove(silent).stream.shutdown();
         }
         clients.push(Arc::clone(&client));

@@ -1,6 +1,6 @@
 //! One client's talk with the server: read within limits of size and time, and answered.
 
-use super::clients::{Client, FRAMES, REFUSED, Shared};
+use super::clients::{Client, FRAMES, REFUSED, Request, Shared};
 #[cfg(unix)]
 use super::local::{self, Buffer};
 use super::slmsuite::{Command, answer, description, hardware};
@@ -16,6 +16,8 @@ use std::time::{Duration, Instant};
 const CHUNK: usize = 64 * 1024;
 /// How many whole requests' worth of bytes may be held at once, over all clients.
 const HELD_REQUESTS: usize = 4;
+/// What a client is told when too many frames are being read at once.
+const BUSY: &str = "The server is busy with other frames.";
 /// A request may take this many times the patience in all, however steadily it drips.
 const WHOLE_REQUEST: u32 = 6;
 
@@ -77,17 +79,14 @@ impl<'a> Conversation<'a> {
                 self.shared.count(REFUSED);
                 return self.reply(slmpy::ERR);
             };
-            if !self.hold(length, limit) {
-                self.shared.count(REFUSED);
-                return self.reply(slmpy::ERR);
-            }
             let mut sent = Vec::new();
             let start = Instant::now();
             while sent.len() < length {
                 let had = sent.len();
                 // Memory grows with what has come, not with what was promised.
                 sent.resize((had + CHUNK).min(length), 0);
-                if let Err(error) = self.whole(&mut sent[had..], start) {
+                let room = self.wait_for_room(sent.len() - had, limit).map_err(io::Error::other);
+                if let Err(error) = room.and_then(|()| self.whole(&mut sent[had..], start)) {
                     self.shared.count(REFUSED);
                     let _ = self.reply(slmpy::ERR);
                     return Err(error);
@@ -136,7 +135,9 @@ impl<'a> Conversation<'a> {
                     Ok(None)
                 }
                 local::Command::Show(array) => {
-                    let frame = self.wait_for_room(buffer.bytes()).and_then(|()| buffer.take(array, &shared.panel));
+                    let frame = self
+                        .wait_for_room(buffer.bytes(), buffer.bytes())
+                        .and_then(|()| buffer.take(array, &shared.panel));
                     self.release();
                     frame.map(Some)
                 }
@@ -176,6 +177,7 @@ impl<'a> Conversation<'a> {
             })
         });
         if let Ok(flip) = &outcome {
+            self.client.proven.store(true, Ordering::SeqCst);
             // Here and not at the panel: others may have theirs shown meanwhile.
             std::thread::sleep(self.shared.settle.saturating_sub(flip.at.elapsed()));
         }
@@ -211,9 +213,8 @@ impl<'a> Conversation<'a> {
                     "The request is longer than a frame of this panel.",
                 ));
             }
-            if !self.hold(part.len(), limit) {
-                return Err(io::Error::new(ErrorKind::OutOfMemory, "The server is busy with other requests."));
-            }
+            let room = self.wait_for_room(part.len(), limit);
+            room.map_err(|why| io::Error::new(ErrorKind::OutOfMemory, why))?;
             line.extend_from_slice(part);
             if ended {
                 return Ok(line);
@@ -252,31 +253,51 @@ impl<'a> Conversation<'a> {
         }
     }
 
-    /// Takes `bytes` of the server's budget, which is of requests up to `limit`; false when it is spent. The first
-    /// request always fits.
+    /// Takes room for `bytes` more; false when there is none.
+    ///
+    /// Each client has room for a plain frame of its own. What a request takes beyond that comes out of a budget of requests
+    /// up to `limit`, one for each kind of client, in turn.
     fn hold(&mut self, bytes: usize, limit: usize) -> bool {
-        let limit = limit.max(slmsuite::request_limit(&self.shared.panel));
-        let before = self.shared.held.fetch_add(bytes, Ordering::SeqCst);
+        let own = slmpy::frame_limit(&self.shared.panel);
+        let beyond = |held: usize| held.saturating_sub(own);
+        let more = beyond(self.held + bytes) - beyond(self.held);
+        if more > 0 {
+            let budget = HELD_REQUESTS * limit.max(slmsuite::request_limit(&self.shared.panel));
+            let queue = &self.shared.queues[usize::from(self.client.is_local)];
+            if !queue.take(self.client.number, more, budget) {
+                return false;
+            }
+        }
         self.held += bytes;
-        before + bytes <= HELD_REQUESTS * limit
+        let mut request = self.client.request.lock().unwrap_or_else(PoisonError::into_inner);
+        let since = request.as_ref().map_or_else(Instant::now, |request| request.since);
+        *request = Some(Request { since, beyond: beyond(self.held), waits: false });
+        true
     }
 
-    /// Takes `bytes` of the budget as soon as others have given back what they held.
-    #[cfg(unix)]
-    fn wait_for_room(&mut self, bytes: usize) -> Result<(), String> {
+    /// Takes room for `bytes` as soon as there is some: who has long held much of a request and sends no more is cut off for
+    /// it.
+    fn wait_for_room(&mut self, bytes: usize, limit: usize) -> Result<(), String> {
         let start = Instant::now();
-        while !self.hold(bytes, bytes) {
-            self.release();
+        while !self.hold(bytes, limit) {
             if start.elapsed() > self.shared.patience {
-                return Err(local::BUSY.to_owned());
+                self.shared.queues[usize::from(self.client.is_local)].leave(self.client.number);
+                return Err(BUSY.to_owned());
             }
+            if let Some(request) = &mut *self.client.request.lock().unwrap_or_else(PoisonError::into_inner) {
+                request.waits = true;
+            }
+            self.shared.cut_off_idle(self.client);
             std::thread::sleep(Duration::from_millis(1));
         }
         Ok(())
     }
 
     fn release(&mut self) {
-        self.shared.held.fetch_sub(std::mem::take(&mut self.held), Ordering::SeqCst);
+        let held = std::mem::take(&mut self.held);
+        let beyond = held.saturating_sub(slmpy::frame_limit(&self.shared.panel));
+        self.shared.queues[usize::from(self.client.is_local)].give_back(self.client.number, beyond);
+        *self.client.request.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 }
 

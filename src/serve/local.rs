@@ -49,8 +49,6 @@ use std::time::Instant;
 const VERSION: u32 = 1;
 /// Longest request [bytes]; real ones have about fifty.
 pub(super) const LINE_LIMIT: usize = 1024;
-/// What a client is told when too many frames are being read at once.
-pub(super) const BUSY: &str = "The server is busy with other frames.";
 /// Bytes of a pixel in the widest type that is taken.
 const WIDEST: usize = 8;
 
@@ -86,10 +84,13 @@ impl LocalSocket {
             DirBuilder::new().mode(0o700).create(&folder).map_err(Error::io(&folder))?;
         }
         // In a folder that others may write in, they could put a socket of theirs in the place of ours.
-        let about = fs::symlink_metadata(&folder).map_err(Error::io(&folder))?;
         let private = folder == runtime_folder();
-        if private && (!about.is_dir() || about.uid() != geteuid().as_raw() || about.mode() & 0o022 != 0) {
-            let what = format!("{} is not a folder that only you can write in; remove it", folder.display());
+        let about = if private { fs::symlink_metadata(&folder) } else { fs::metadata(&folder) };
+        let about = about.map_err(Error::io(&folder))?;
+        let own = about.uid() == geteuid().as_raw() || (!private && about.uid() == 0);
+        if !about.is_dir() || !own || about.mode() & 0o022 != 0 {
+            let hint = if private { "remove it" } else { "take one that is yours" };
+            let what = format!("{} is not a folder that only you can write in; {hint}", folder.display());
             return Err(Error::Display { what });
         }
         if fs::symlink_metadata(socket).is_ok() {
