@@ -6,6 +6,7 @@ use super::report::{Report, count, seconds, step};
 use super::resolve;
 use super::sequence::{self, CELL, SHEET, frame_path};
 use glam::DVec2;
+use holodrive::encode::Encoding;
 use holodrive::field::Grid;
 use holodrive::panel::Setup;
 use holodrive::pipeline::{self, Bench};
@@ -36,7 +37,9 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
     sequence::check(args)?;
     let begin = Instant::now();
     let setup = resolve::setup(&args.panel, &mut report)?;
-    let (setup, mut settings) = resolve::settings(args, setup)?;
+    let usual = Encoding::usual(setup.profile.modulation());
+    let (setup, mut settings) = resolve::settings(args, setup, usual)?;
+    resolve::check_in_time(&settings, &setup)?;
     // All frames look for the object at the same depths.
     let content = match settings.scene.placement {
         Placement::Window { near, far, .. } => [near, far],
@@ -44,7 +47,9 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
     };
     settings.encode.fix_depths(content);
     // What cannot be is found out before the work.
-    report.warn(settings.encode.settings(&setup, setup.wavelength, Some(content))?.1);
+    if !matches!(settings.encode.encoding, Some(Encoding::View(_))) {
+        report.warn(settings.encode.settings(&setup, setup.wavelength, Some(content))?.1);
+    }
     let rate = args.sequence.fps.unwrap_or(USUAL_RATE);
     let animation = Animation::new(path, &settings, rate, args.sequence.from, args.sequence.to)?;
     #[cfg(feature = "display")]

@@ -1,15 +1,16 @@
 //! `bench`: what there is, side by side.
 
-use super::args::{BenchCommand, EncodingsArgs, IterationsArgs};
+use super::args::{BenchCommand, BenchViewsArgs, EncodingsArgs, IterationsArgs};
 use super::bar::Bar;
 use super::report::{Report, seconds};
 use holodrive::comparison::{
-    ComparedPicture, Effort, compare, encodings, flat_picture, markdown, panels, scene_picture,
+    ComparedPicture, Effort, VIEW_ENCODINGS, ViewRow, ViewScene, compare, compare_views, encodings, flat_picture,
+    markdown, panels, scene_picture, view_cases, views_markdown,
 };
 use holodrive::encode::iterative::{GradientDescent, Start, Target, TargetPlane, gradient_descent};
 use holodrive::field::{Complex32, Fft2};
 use holodrive::names::Named;
-use holodrive::panel::PanelProfile;
+use holodrive::panel::{PanelProfile, Setup};
 use holodrive::{Error, Result, files};
 use serde_json::json;
 use std::time::Instant;
@@ -17,6 +18,7 @@ use std::time::Instant;
 pub(super) fn bench(command: &BenchCommand) -> Result<Report> {
     match command {
         BenchCommand::Encodings(args) => table(args),
+        BenchCommand::Views(args) => views(args),
         BenchCommand::Iterations(args) => iterations(args),
     }
 }
@@ -55,6 +57,56 @@ fn table(args: &EncodingsArgs) -> Result<Report> {
     }
     let table = markdown(&rows);
     report.section(json!({ "simulated": true, "size": [width, height], "iterations": args.iterations, "rows": rows }));
+    report.line(table.trim_end());
+    if let Some(path) = &args.output {
+        files::write_bytes(path, table.as_bytes())?;
+        report.output("table", path);
+    }
+    Ok(report)
+}
+
+fn views(args: &BenchViewsArgs) -> Result<Report> {
+    let mut report = Report::new("bench views");
+    let (width, height) = args.size;
+    if width < 128 || height < 128 || width * height > 1 << 24 {
+        return Err(Error::parameter("size", format!("{width}×{height}: sides of 128 or more, 2²⁴ pixels at most")));
+    }
+    let wanted = |name: &str| args.case.is_empty() || args.case.iter().any(|case| name.starts_with(case.as_str()));
+    let mut cases: Vec<_> = view_cases().into_iter().filter(|case| wanted(case.name)).collect();
+    if cases.is_empty() {
+        let names: Vec<&str> = view_cases().iter().map(|case| case.name).collect();
+        return Err(Error::parameter("case", format!("{:?} is none of {}", args.case, names.join("; "))));
+    }
+    if let Some(iterations) = args.iterations {
+        cases.iter_mut().for_each(|case| case.iterations = iterations as usize);
+    }
+    let only = |name: &&str| args.only.is_empty() || args.only.iter().any(|only| name.starts_with(only.name()));
+    let bar = Bar::new();
+    let setup = Setup::new(PanelProfile::phase(width, height, 8e-6, 8, 632.8e-9)?, None)?;
+    let mut scenes = vec![("layers".to_owned(), ViewScene::layers(&setup)?)];
+    for path in &args.scene {
+        let name = path.file_stem().map_or_else(|| path.display().to_string(), |s| s.to_string_lossy().into_owned());
+        scenes.push((name, ViewScene::read(path, &setup, &bar.progress)?));
+    }
+    let mut rows = Vec::new();
+    for (name, scene) in &scenes {
+        for case in &cases {
+            let light = scene.views(&case.viewer, &setup, &bar.progress)?;
+            for encoding in VIEW_ENCODINGS.into_iter().filter(only) {
+                let found = compare_views(scene, &light, case, encoding, &setup, &bar.progress)?;
+                rows.extend(found.map(|(seen, seconds)| ViewRow {
+                    scene: name.clone(),
+                    case: case.name,
+                    encoding,
+                    frames: case.frames,
+                    seen,
+                    seconds,
+                }));
+            }
+        }
+    }
+    let table = views_markdown(&rows);
+    report.section(json!({ "simulated": true, "size": [width, height], "rows": rows }));
     report.line(table.trim_end());
     if let Some(path) = &args.output {
         files::write_bytes(path, table.as_bytes())?;

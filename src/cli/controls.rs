@@ -110,6 +110,12 @@ impl Controls {
         DVec3::new(x * SHIFT_STEP, y * SHIFT_STEP, z * DEPTH_STEP)
     }
 
+    /// The eye beside its place [m].
+    pub(super) fn eye_aside(&self) -> DVec3 {
+        let [x, y] = self.eye.unwrap_or_default().map(|steps| f64::from(steps) * EYE_STEP);
+        DVec3::new(x, y, 0.0)
+    }
+
     pub(super) fn look_at(&self, near: f64) -> Look {
         Look {
             focus: self.focus.unwrap_or(near),

@@ -2,21 +2,27 @@
 
 use super::args::{EncodeArgs, EncodingArgs};
 use super::bar::Bar;
-use super::holograms::{Maker, report_encoding};
+use super::eye;
+use super::field::{self, For, Held};
+use super::holograms::{Maker, named, report_encoding};
+use super::light::report_map;
 use super::load::{Input, input};
+use super::output;
 use super::report::{Report, step};
 use super::resolve;
 use holodrive::encode::pictures::{DepthPicture, encode_planes};
-use holodrive::encode::{Encoding, PlaneEncoding, PlaneMethod, PlaneStart};
-use holodrive::field::npy;
+use holodrive::encode::{Encoding, PlaneEncoding, PlaneMethod, PlaneStart, ViewEncoding};
+use holodrive::light_field::LightField;
 use holodrive::names::Named;
 use holodrive::panel::{Frame, Origin, Setup};
-use holodrive::pipeline::Settings;
+use holodrive::pipeline::{self, Settings};
+use holodrive::points::Exposure;
+use holodrive::points::depth_map::DepthMap;
 use holodrive::progress::Progress;
 use holodrive::reconstruction::read_gray;
 use holodrive::scene::texture::linear_from_srgb;
 use holodrive::{Error, Result};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 pub(super) fn encode(args: &EncodeArgs) -> Result<Report> {
@@ -25,29 +31,80 @@ pub(super) fn encode(args: &EncodeArgs) -> Result<Report> {
     let setup = resolve::setup(&args.panel, &mut report)?;
     let setup = Setup { correction: resolve::correction(args.encoding.correction.as_deref())?, ..setup };
     let bar = Bar::new();
-    let frame = if args.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
-        encode_field(args, &setup, &bar.progress, &mut report)?
-    } else {
-        encode_picture(args, &setup, &bar.progress, &mut report)?
+    let source = input(&args.input)?;
+    output::check(&args.output, &output::FRAMES)?;
+    if let Input::Views(path) = &source {
+        encode_views(args, path, &setup, &bar.progress, &mut report)?;
+        return Ok(report);
+    }
+    if args.subframes != 1 {
+        let what = "several frames together are found for a light field (.npz, folder), or by show";
+        return Err(Error::parameter("subframes", what));
+    }
+    let frame = match source {
+        Input::Field(path) => encode_field(args, &path, &setup, &bar.progress, &mut report)?,
+        source => encode_picture(args, &source, &setup, &bar.progress, &mut report)?,
     };
     bar.progress.check()?;
-    frame.write(&args.output)?;
+    output::write_frame(&frame, &args.output)?;
     report.output("frame", &args.output);
     Ok(report)
 }
 
-fn encode_field(args: &EncodeArgs, setup: &Setup, progress: &Progress, report: &mut Report) -> Result<Frame> {
-    let pitch = [setup.grid.pitch_x, setup.grid.pitch_y];
-    let beside = npy::read_metadata(&args.input)?;
-    let wavelength = args.panel.wavelength.or(beside.as_ref().map(|m| m.wavelength)).unwrap_or(setup.wavelength);
-    let (field, metadata) = npy::read_field(&args.input, Some(pitch), Some(wavelength))?;
-    let settings = Settings { encode: resolve::encode(&args.encoding, setup)?, ..Settings::default() };
+/// Frames that show a light field.
+fn encode_views(args: &EncodeArgs, path: &Path, setup: &Setup, progress: &Progress, report: &mut Report) -> Result<()> {
+    let file = LightField::read(path)?;
+    let encode = resolve::encode(&args.encoding, Encoding::View(ViewEncoding::default()))?;
+    let Some(Encoding::View(view)) = encode.encoding.clone() else {
+        let name = encode.encoding.as_ref().map_or("this encoding", |encoding| encoding.name());
+        let what = format!("{name} encodes a field, not a light field: take view");
+        return Err(Error::parameter("encoding", what));
+    };
+    let viewer = resolve::viewer(&args.viewer, None, Some(&file));
+    resolve::check_viewer(&viewer, setup)?;
+    let settings =
+        Settings { encode, viewer, sub_frames: resolve::sub_frames(args.subframes, false, 1)?, ..Settings::default() };
+    let light = eye::light_field(&eye::Content::Views(file), setup, &settings, progress, report)?;
+    let exposures = pipeline::exposures(setup, &settings, None);
     let maker = Maker { input: &args.input, setup, settings: &settings, progress };
-    maker.frame(&field, &metadata.content, None, report)
+    let path = |exposure: &Exposure| named(&args.output, &exposure.suffix());
+    maker.views(&view, &light, &exposures, path, report)?;
+    report.value("output", args.output.display().to_string());
+    exposures.iter().for_each(|exposure| report.line(format!("{:<12} {}", "frame", path(exposure).display())));
+    Ok(())
+}
+
+fn encode_field(
+    args: &EncodeArgs,
+    path: &Path,
+    setup: &Setup,
+    progress: &Progress,
+    report: &mut Report,
+) -> Result<Frame> {
+    let wanted = For { flags: &args.field, panel: Some(&setup.profile), wavelength: args.panel.wavelength, progress };
+    match wanted.read(path, report)? {
+        Held::Levels(_) if args.encoding.encoding.is_some() => {
+            let what = "is for a field; whole numbers are drive levels already: leave it out, or save complex numbers or phases";
+            Err(Error::parameter("encoding", what))
+        }
+        Held::Levels(frame) => Ok(*frame),
+        Held::Field { field, content, are_phases } => {
+            let usual = field::usual(setup.profile.modulation(), are_phases);
+            let settings = Settings { encode: resolve::encode(&args.encoding, usual)?, ..Settings::default() };
+            let maker = Maker { input: &args.input, setup, settings: &settings, progress };
+            maker.frame(&field, &content, None, report)
+        }
+    }
 }
 
 /// A picture at one depth, or sorted by its depth map into several.
-fn encode_picture(args: &EncodeArgs, setup: &Setup, progress: &Progress, report: &mut Report) -> Result<Frame> {
+fn encode_picture(
+    args: &EncodeArgs,
+    source: &Input,
+    setup: &Setup,
+    progress: &Progress,
+    report: &mut Report,
+) -> Result<Frame> {
     let begin = Instant::now();
     let usual = || Encoding::Planes(PlaneEncoding::new(PlaneMethod::Gradient));
     let chosen = args.encoding.encoding.clone().unwrap_or_else(usual);
@@ -60,15 +117,15 @@ fn encode_picture(args: &EncodeArgs, setup: &Setup, progress: &Progress, report:
         return Err(Error::parameter("encoding", what));
     }
     let flags = EncodingArgs { encoding: Some(chosen), ..args.encoding.clone() };
-    let (settings, warnings) = resolve::encode(&flags, setup)?.settings(setup, setup.wavelength, None)?;
+    let (settings, warnings) = resolve::encode(&flags, usual())?.settings(setup, setup.wavelength, None)?;
     report.warn(warnings);
     let Encoding::Planes(given) = &settings.encoding else {
         return Err(Error::parameter("encoding", "is for fields"));
     };
-    let (rgb, map) = match input(&args.input)? {
+    let (rgb, map) = match source {
         Input::Images(rgb, map) => (rgb, Some(map)),
         Input::Frame(path) => (path, None),
-        _ => return Err(Error::input(&args.input, "is neither a field (.npy) nor a picture")),
+        _ => return Err(Error::input(&args.input, "is neither a field (.npy, .mat, .h5) nor a picture")),
     };
     if given.depths.is_empty() {
         return Err(Error::parameter("depths", "give the depth at which the picture stands, such as --depths -100mm"));
@@ -80,7 +137,8 @@ fn encode_picture(args: &EncodeArgs, setup: &Setup, progress: &Progress, report:
         None => PlaneStart::Random { seed: 1 },
     };
     let own = PlaneEncoding { start, ..given.clone() };
-    let planes = read_picture(&rgb, map.as_deref(), &own.depths)?.planes(&setup.grid, args.picture.window)?;
+    let planes = read_picture(args, rgb, map.map(PathBuf::as_path), &own.depths, report)?
+        .planes(&setup.grid, args.picture.window)?;
     let kept: Vec<f64> = planes.iter().map(|plane| plane.z).collect();
     let (correction, light) = (settings.correction.as_ref(), settings.illumination);
     let (mut made, found) = encode_planes(planes, setup.wavelength, &setup.profile, &own, correction, light, progress)?;
@@ -103,8 +161,14 @@ fn encode_picture(args: &EncodeArgs, setup: &Setup, progress: &Progress, report:
     Ok(made.frame)
 }
 
-/// A picture as linear light; with a depth map (white near), its pixels are sorted into the nearest of the depths.
-fn read_picture(rgb: &Path, map: Option<&Path>, depths: &[f64]) -> Result<DepthPicture> {
+/// A picture as linear light; with a depth map its pixels are sorted into the nearest of the depths.
+fn read_picture(
+    args: &EncodeArgs,
+    rgb: &Path,
+    map: Option<&Path>,
+    depths: &[f64],
+    report: &mut Report,
+) -> Result<DepthPicture> {
     let (width, height, coded) = read_gray(rgb)?;
     let light: Vec<f32> = coded.into_iter().map(linear_from_srgb).collect();
     let Some(map) = map else {
@@ -115,12 +179,17 @@ fn read_picture(rgb: &Path, map: Option<&Path>, depths: &[f64]) -> Result<DepthP
         };
         return Ok(DepthPicture::flat(width, height, light, *z));
     };
-    let (w, h, nearness) = read_gray(map)?;
-    if (w, h) != (width, height) {
-        return Err(Error::input(map, format!("is {w}×{h}, the picture {width}×{height}")));
+    let read = DepthMap::read(map, &args.map.reading())?;
+    report_map(&read, report);
+    if (read.width as usize, read.height as usize) != (width, height) {
+        return Err(Error::input(map, format!("is {}×{}, the picture {width}×{height}", read.width, read.height)));
     }
     let near = depths.iter().fold(f64::NEG_INFINITY, |a, &z| a.max(z));
     let far = depths.iter().fold(f64::INFINITY, |a, &z| a.min(z));
-    let z: Vec<f64> = nearness.iter().map(|&v| far + (near - far) * f64::from(v)).collect();
+    // What was not measured is dark, and stands behind.
+    let mut light = light;
+    light.iter_mut().zip(&read.parts).filter(|(_, part)| part.is_nan()).for_each(|(light, _)| *light = 0.0);
+    let place = |part: &f32| if part.is_nan() { far } else { near + (far - near) * f64::from(*part) };
+    let z: Vec<f64> = read.parts.iter().map(place).collect();
     Ok(DepthPicture::sorted(width, height, light, &z, depths))
 }

@@ -5,13 +5,14 @@ use super::load::Points;
 use super::report::{Report, step};
 use holodrive::encode::EncodeReport;
 use holodrive::field::Field;
-use holodrive::field::npy::{self, Content};
+use holodrive::field::npy::Content;
+use holodrive::field::stored;
 use holodrive::hologram::Computed;
 use holodrive::names::Named;
 use holodrive::panel::{Frame, Origin, Setup};
 use holodrive::pipeline::{self, Settings};
 use holodrive::points::colour::NAMES;
-use holodrive::points::{Exposure, Multiplexing, Share, SubFrames};
+use holodrive::points::{Exposure, Multiplexing, Reach, Share, SubFrames};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::colour::laser_powers;
 use holodrive::units::show_length;
@@ -35,7 +36,7 @@ pub(super) fn named(path: &Path, suffix: &str) -> PathBuf {
 }
 
 /// Adds what one exposure took: as a part of its own where there are several.
-fn add_exposure(exposure: &Exposure, part: Report, report: &mut Report) {
+pub(super) fn add_exposure(exposure: &Exposure, part: Report, report: &mut Report) {
     match exposure.share {
         Share::Whole(_) => report.merge(part),
         Share::Laser { index, .. } => {
@@ -118,6 +119,11 @@ impl Maker<'_> {
             report.value("wavelength", exposure.wavelength);
         }
         if let Some(computed) = &computed {
+            if computed.field.energy() == 0.0 {
+                let reach = Reach::of(&points.cloud, &self.setup.grid, exposure.wavelength);
+                let what = format!("its field on the panel is dark everywhere: {reach}");
+                return Err(Error::input(self.input, what));
+            }
             report_field(computed, report);
         }
         Ok(computed)
@@ -128,7 +134,7 @@ impl Maker<'_> {
         if let Some(lasers) = &self.setup.lasers {
             origin += &format!("; {}, {}", exposure.label(), lasers.wavelengths().map(show_length).join(", "));
         }
-        npy::write_field(path, &computed.field, &points.content(), &origin)
+        stored::write_field(path, &computed.field, &points.content(), &origin)
     }
 
     /// A field as a frame, with its time.
@@ -165,7 +171,7 @@ impl Maker<'_> {
     }
 
     /// The powers of three lasers that make the colours right stand in their frames.
-    fn note_powers(&self, frames: &mut [Option<Frame>], report: &mut Report) {
+    pub(super) fn note_powers(&self, frames: &mut [Option<Frame>], report: &mut Report) {
         let Some(lasers) = &self.setup.lasers else { return };
         // Without light a laser's power is nil: 1/∞².
         let scale = |frame: &Option<Frame>| match frame {
@@ -191,6 +197,10 @@ fn report_field(computed: &Computed, report: &mut Report) {
         "method": did.method.name(),
         "method_reason": did.reason,
         "error_bound": did.error_bound,
+        "error_measured": did.measured.error,
+        "error_limit": did.measured.limit,
+        "error_pixels": did.measured.pixels,
+        "error_seconds": did.measured.seconds,
         "field_seconds": did.seconds,
         "predicted_seconds": did.predicted_seconds,
         "instruction_set": did.instruction_set.name(),
@@ -198,7 +208,12 @@ fn report_field(computed: &Computed, report: &mut Report) {
         "pairs": did.coverage.pairs,
     }));
     let (method, set) = (did.method.name(), did.instruction_set.name());
-    let what = format!("{method} ({set}): {}; error below {:.1e}", did.reason, did.error_bound);
+    let measured = &did.measured;
+    let what = format!(
+        "{method} ({set}): {}; error below {:.1e} of the field, measured {:.1e} at {} pixels",
+        did.reason, did.error_bound, measured.error, measured.pixels
+    );
+    report.warn(did.warnings.iter());
     report.line(step("field", did.seconds, what));
 }
 

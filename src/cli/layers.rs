@@ -2,10 +2,12 @@
 
 use super::args::ComputeArgs;
 use super::holograms::named;
+use super::light::report_map;
 use super::load::Input;
 use super::report::{Report, step};
 use super::resolve;
-use holodrive::field::npy::{self, Content};
+use holodrive::field::npy::Content;
+use holodrive::field::stored;
 use holodrive::hologram::layers::{self, SliceSettings};
 use holodrive::panel::Setup;
 use holodrive::points::colour::NAMES;
@@ -29,7 +31,8 @@ pub(super) fn compute(
     let placement = resolve::placement(&args.placement);
     let slices = match (input, args.layers) {
         (Input::Images(rgb, depth), Some(count)) => {
-            let picture = RgbDepth::read(rgb, depth, args.map.depth_scale, &placement)?;
+            let picture = RgbDepth::read(rgb, depth, &args.map.reading(), &placement)?;
+            report_map(&picture.map, report);
             let window = PictureWindow::new(&placement, picture.size(), &setup.grid)?;
             Slices::of_depth(picture, window, &setup.grid, count)?
         }
@@ -39,16 +42,16 @@ pub(super) fn compute(
         (Input::Stack(files), None) => Slices::of_stack(files, &placement, &setup.grid)?,
         _ => return Err(Error::parameter("layers", "layers are for a picture with depth (rgb.png+depth.png)")),
     };
-    let seed = match args.placement.phase {
+    let seed = match args.placement.phase(args.light.random.seed) {
         Phase::Zero => None,
-        Phase::Random { .. } => Some(args.light.random.seed),
+        Phase::Random { seed } => Some(seed),
         Phase::Path => {
             return Err(Error::parameter("phase", "path is for scenes; use zero or random with a picture"));
         }
     };
     let settings = SliceSettings { occlude: !args.see_through, random_phase: seed, memory: args.hologram.memory };
     let lights: Vec<(f64, LightColor)> = match &setup.lasers {
-        None => vec![(setup.wavelength, LightColor::Channel(args.hologram.channel))],
+        None => vec![(setup.wavelength, LightColor::Channel(args.channel.channel))],
         Some(lasers) => (0..3).map(|i| (lasers.wavelengths()[i], LightColor::Laser(lasers, i))).collect(),
     };
     let colored = lights.len() > 1;
@@ -71,7 +74,7 @@ pub(super) fn compute(
         let path = if colored { named(&args.output, &format!("-{}", NAMES[i])) } else { args.output.clone() };
         let content = Content { z: 0.0, depth: Some([first, last]), eye: None, window: None };
         let origin = format!("{} layers of {}", depths.len(), args.input.display());
-        npy::write_field(&path, &field, &content, &origin)?;
+        stored::write_field(&path, &field, &content, &origin)?;
         part.output("field", &path);
         if colored {
             report.add_part(NAMES[i], format!("{:<12} {}", NAMES[i], show_length(wavelength)), own);

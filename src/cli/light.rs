@@ -4,6 +4,7 @@ use super::report::{Report, count, step};
 use holodrive::points::PointCloud;
 use holodrive::points::budget::{Limit, Rays};
 use holodrive::points::colour::{Gamut, Lasers};
+use holodrive::points::depth_map::DepthMap;
 use holodrive::points::{ScenePoints, WhiteLevel};
 use holodrive::units::show_length;
 use serde_json::json;
@@ -14,6 +15,18 @@ pub(super) fn report_cloud(cloud: &PointCloud, elapsed: f64, report: &mut Report
     let range =
         depth.map(|(far, near)| format!(", z {} … {}", show_length(far), show_length(near))).unwrap_or_default();
     report.line(step("points", elapsed, format!("{} points{range}", count(points))));
+}
+
+/// How a depth map was read.
+pub(super) fn report_map(map: &DepthMap, report: &mut Report) {
+    report.warn(map.warnings.iter());
+    report.section(json!({ "depth_map": map.origin, "unmeasured": map.unmeasured }));
+    let all = map.parts.len();
+    let left_out = match map.unmeasured {
+        0 => String::new(),
+        pixels => format!("; {} of {} pixels without measurement left out", count(pixels), count(all)),
+    };
+    report.line(format!("depth map              {}{left_out}", map.origin));
 }
 
 pub(super) fn report_light(scene: &ScenePoints, elapsed: f64, report: &mut Report) {

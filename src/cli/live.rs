@@ -7,7 +7,10 @@ use super::load::{self, Input};
 use super::report::{Report, count, seconds};
 use super::resolve;
 use super::screen::show_settings;
+use super::tracker::Tracker;
+use glam::DVec3;
 use holodrive::display::{Display, DisplayFrame, Key, KeyPress, OperatorChoice, PanelLoop, ShowEnd, Turn};
+use holodrive::encode::Encoding;
 use holodrive::live::{
     Board, Detail, LiveHologram, OperatorPicture, PICTURE, Request, Viewer, Watch, Worker, WorkerEvent, draw,
 };
@@ -37,6 +40,9 @@ struct Live<'a> {
     shown: PanelLoop<'a>,
     newest: Option<Arc<LiveHologram>>,
     seen: Option<OperatorPicture>,
+    /// Where the eye is, but for the keys [m].
+    eye: DVec3,
+    tracker: Option<Tracker>,
     /// From the request until the panel had it: of the newest hologram.
     presented: f64,
     warning: Option<String>,
@@ -71,7 +77,9 @@ pub(super) fn show(args: &ShowArgs, mut report: Report) -> Result<Report> {
     };
     let place: OperatorChoice = args.operator.parse()?;
     let setup = resolve::setup(&args.panel, &mut report)?;
-    let (setup, steps) = resolve::settings(args, setup)?;
+    let usual = Encoding::usual(setup.profile.modulation());
+    let (setup, steps) = resolve::settings(args, setup, usual)?;
+    resolve::check_in_time(&steps, &setup)?;
     let mut display = Display::connect()?;
     let monitors = display.monitors()?;
     let monitor = settings.monitor.find(&monitors)?;
@@ -90,7 +98,12 @@ pub(super) fn show(args: &ShowArgs, mut report: Report) -> Result<Report> {
         shown.open_operator(&home, &Arc::new(picture(&Board { keys: &KEYS, ..Board::default() })?))?;
     }
     let (choices, controls) = (Choices::new(args, &setup), Controls::new());
-    let first = request(args, &setup, &choices, &controls)?;
+    let mut tracker = args.eye_from.as_deref().map(Tracker::new);
+    let mut eye = steps.viewer.eye;
+    if let Some(tracker) = &mut tracker {
+        eye = tracker.look()?.ok_or_else(|| Error::parameter("eye-from", "says nothing: X,Y,Z"))?;
+    }
+    let first = request(args, &setup, &choices, &controls, eye)?;
     let viewer_bench = steps.bench.clone();
     let (worker, files) = Worker::start(&path, setup.clone(), steps, first)?;
     files::output_folder(&args.output)?;
@@ -108,6 +121,8 @@ pub(super) fn show(args: &ShowArgs, mut report: Report) -> Result<Report> {
         setup,
         choices,
         controls,
+        eye,
+        tracker,
         worker,
         viewer: Viewer::start(size, viewer_bench),
         watch: Watch::new(files),
@@ -135,7 +150,7 @@ fn picture(board: &Board) -> Result<DisplayFrame> {
 }
 
 /// What the flags and keys ask for.
-fn request(args: &ShowArgs, setup: &Setup, choices: &Choices, controls: &Controls) -> Result<Request> {
+fn request(args: &ShowArgs, setup: &Setup, choices: &Choices, controls: &Controls, eye: DVec3) -> Result<Request> {
     let wavelength = choices.wavelengths.get(controls.wavelength).copied().unwrap_or(setup.wavelength);
     let mut flags = args.encoding.clone();
     flags.encoding = choices.encodings.get(controls.encoding).cloned();
@@ -143,12 +158,17 @@ fn request(args: &ShowArgs, setup: &Setup, choices: &Choices, controls: &Control
         Placement::Window { near, far, .. } => [near, far],
         Placement::Model { z, .. } => [z, z],
     };
-    let mut encode = resolve::encode(&flags, setup)?;
+    let mut encode = resolve::encode(&flags, Encoding::usual(setup.profile.modulation()))?;
     encode.fix_depths(content);
     // What cannot be is not asked for; warnings of a profile were told at the beginning.
-    encode.settings(setup, wavelength, Some(content))?;
+    let eye = eye + controls.eye_aside();
+    if let Some(Encoding::View(_)) = encode.encoding {
+        resolve::check_viewer(&holodrive::light_field::Viewer::at(eye), setup)?;
+    } else {
+        encode.settings(setup, wavelength, Some(content))?;
+    }
     let turn = controls.turn.map(|steps| f64::from(steps) * TURN_STEP);
-    Ok(Request { turn, shift: controls.shifted(), wavelength, encode })
+    Ok(Request { turn, shift: controls.shifted(), wavelength, eye, encode })
 }
 
 impl Live<'_> {
@@ -170,6 +190,7 @@ impl Live<'_> {
                     self.request(true)?;
                 }
             }
+            self.follow()?;
             while let Some(event) = self.worker.poll()? {
                 self.heard(event)?;
             }
@@ -177,10 +198,30 @@ impl Live<'_> {
         }
     }
 
+    /// Goes where the eye has gone.
+    fn follow(&mut self) -> Result<()> {
+        match self.tracker.as_mut().map_or(Ok(None), Tracker::look) {
+            Ok(Some(eye)) if eye != self.eye => {
+                let before = std::mem::replace(&mut self.eye, eye);
+                if self.request(false)?.is_none() {
+                    self.eye = before;
+                }
+            }
+            Ok(_) => {}
+            Err(error) => self.warn(&error.to_string()),
+        }
+        Ok(())
+    }
+
+    /// Whether frames are made for the eye.
+    fn is_view(&self) -> bool {
+        matches!(self.choices.encodings.get(self.controls.encoding), Some(Encoding::View(_)))
+    }
+
     /// Depth of the nearest object of the newest hologram.
     fn near(&self) -> f64 {
         let focus = self.newest.as_ref().and_then(|newest| newest.points.view.focus.first());
-        focus.map_or(self.args.placement.near, |(_, z)| *z)
+        focus.map_or(self.args.placement.near(), |(_, z)| *z)
     }
 
     fn keys(&mut self, keys: &[KeyPress]) -> Result<()> {
@@ -190,7 +231,13 @@ impl Live<'_> {
             match self.controls.press(*press, &self.choices, self.near()) {
                 Changed::Nothing => {}
                 Changed::Hologram => (hologram, look) = (true, look || press.key == Key::Letter('r')),
-                Changed::Look => look = true,
+                // A hologram that is made for the eye goes with it.
+                Changed::Look => {
+                    (hologram, look) = (
+                        hologram || (self.is_view() && matches!(press.key, Key::Letter('i' | 'j' | 'k' | 'l' | 'p'))),
+                        true,
+                    )
+                }
             }
         }
         if hologram && self.request(false)?.is_none() {
@@ -206,7 +253,7 @@ impl Live<'_> {
 
     /// Requests what the keys have set; none where that cannot be.
     fn request(&mut self, reload: bool) -> Result<Option<u64>> {
-        match request(self.args, &self.setup, &self.choices, &self.controls) {
+        match request(self.args, &self.setup, &self.choices, &self.controls, self.eye) {
             Ok(request) => {
                 let version = self.worker.request(request, reload);
                 self.event(&json!({ "event": "wish", "version": version, "reload": reload }));
@@ -222,7 +269,12 @@ impl Live<'_> {
 
     fn ask(&mut self) {
         if let Some(newest) = &self.newest {
-            self.viewer.ask(newest, self.controls.look_at(self.near()));
+            let mut look = self.controls.look_at(self.near());
+            if self.tracker.is_some() && self.is_view() {
+                let eye = self.eye - newest.points.view.placing.eye + self.controls.eye_aside();
+                look.eye = Some([eye.x, eye.y]);
+            }
+            self.viewer.ask(newest, look);
         }
     }
 
@@ -265,10 +317,10 @@ impl Live<'_> {
         self.event(&json!({
             "event": "shown", "version": hologram.version, "detail": hologram.detail,
             "points": hologram.points.placed.cloud.points.len(), "since_wish": self.presented,
-            "light_seconds": hologram.light_seconds, "field_seconds": hologram.field.seconds,
+            "light_seconds": hologram.light_seconds, "field_seconds": hologram.field.as_ref().map(|field| field.seconds),
             "encode_seconds": hologram.encode_seconds, "wavelength": wavelength, "encoding": encoding,
             "turn": self.controls.turn.map(|steps| f64::from(steps) * TURN_STEP),
-            "shift": self.controls.shifted().to_array(),
+            "shift": self.controls.shifted().to_array(), "eye": (self.eye + self.controls.eye_aside()).to_array(),
         }));
         self.newest = Some(hologram);
         self.ask();
@@ -321,7 +373,9 @@ impl Live<'_> {
             let points = count(newest.points.placed.cloud.points.len()).replace('\u{202f}', " ");
             lines.push(("hologram", format!("{} {}, {points} points", newest.version, newest.detail.name())));
             lines.push(("light", seconds(newest.light_seconds)));
-            lines.push(("field", format!("{}, {}", seconds(newest.field.seconds), newest.field.method.name())));
+            if let Some(field) = &newest.field {
+                lines.push(("field", format!("{}, {}", seconds(field.seconds), field.method.name())));
+            }
             lines.push(("encoding", format!("{}, {}", seconds(newest.encode_seconds), self.encoding(newest))));
             lines.push(("on panel", format!("{} after the change", seconds(self.presented))));
             lines.push(("laser", show_length(newest.frame.metadata.wavelength)));
@@ -349,7 +403,7 @@ impl Live<'_> {
 
     /// One line for the operator.
     fn warn(&mut self, what: &str) {
-        eprintln!("warning: {what}");
+        eprintln!("warning: {}", super::refusal::one_line(what));
         self.warning = Some(what.to_owned());
     }
 

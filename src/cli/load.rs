@@ -1,15 +1,19 @@
 //! What kind of file an input is, and the points of those that have some.
 
-use super::light::{report_cloud, report_light};
+use super::light::{report_cloud, report_light, report_map};
 use super::report::Report;
 use glam::DVec3;
+use holodrive::field::arrays;
 use holodrive::field::npy::Content;
+use holodrive::light_field::LightField;
 use holodrive::panel::Setup;
 use holodrive::pipeline;
-use holodrive::points::images::DepthScale;
+use holodrive::points::depth_map::DepthReading;
+use holodrive::points::images::RgbDepth;
 use holodrive::points::placement::Phase;
-use holodrive::points::{PointCloud, ScenePoints, SceneSettings, images, ply};
+use holodrive::points::{LitScene, Placement, PointCloud, Reach, ScenePoints, SceneSettings, clouds, images, ply};
 use holodrive::progress::Progress;
+use holodrive::scene::gltf;
 use holodrive::units;
 use holodrive::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -24,35 +28,53 @@ pub(super) enum Input {
     /// Pictures and their depths z [m].
     Stack(Vec<(PathBuf, f64)>),
     Field(PathBuf),
+    /// A light field.
+    Views(PathBuf),
     Frame(PathBuf),
+}
+
+/// Pictures by their endings.
+const PICTURES: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
+/// Depth maps that are no pictures.
+const DEPTHS: [&str; 5] = ["npy", "pfm", "dpt", "npz", "exr"];
+
+fn ending(path: &str) -> String {
+    Path::new(path).extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
 pub(super) fn input(path: &Path) -> Result<Input> {
     let text = path.to_string_lossy();
-    let pictures = [".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"];
     if !path.exists()
         && let Some((rgb, depth)) = text.split_once('+')
-        && [rgb, depth].iter().all(|p| pictures.iter().any(|e| p.to_lowercase().ends_with(e)))
+        && PICTURES.contains(&ending(rgb).as_str())
+        && (PICTURES.contains(&ending(depth).as_str()) || DEPTHS.contains(&ending(depth).as_str()))
     {
         return Ok(Input::Images(rgb.into(), depth.into()));
     }
     if !path.exists() && text.contains('@') {
         return stack(&text);
     }
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let found = match extension.as_str() {
-        "gltf" | "glb" => Input::Scene(path.into()),
-        "ply" => Input::Points(path.into()),
-        "npy" => Input::Field(path.into()),
-        "png" | "bmp" => Input::Frame(path.into()),
+    if LightField::is_folder(path) {
+        return Ok(Input::Views(path.into()));
+    }
+    // What stands behind a colon is the name of an array in the file.
+    let (file, name) = arrays::split(path);
+    let found = match ending(&file.to_string_lossy()).as_str() {
+        _ if gltf::is_scene(path) => Input::Scene(path.into()),
+        _ if clouds::is_cloud(path) => Input::Points(path.into()),
+        "npy" | "mat" | "h5" | "hdf5" | "hdf" => Input::Field(path.into()),
+        "npz" if name.is_some() || !arrays::npz_holds(&file, "views") => Input::Field(path.into()),
+        "npz" => Input::Views(path.into()),
+        "tif" | "tiff" if arrays::is_float_tiff(path) => Input::Field(path.into()),
+        ending if PICTURES.contains(&ending) => Input::Frame(path.into()),
         _ => {
-            let what =
-                "not a kind of file that is read here: .gltf, .glb, .ply, .npy, .png, .bmp, or rgb.png+depth.png";
+            let what = "not a kind of file that is read here: .gltf, .glb, .obj, .stl; .ply, .xyz, .csv, .pcd, .las; .npy, .npz, .mat, .h5; \
+                        .png, .bmp, .tif, .jpg; or rgb.png+depth.png";
             return Err(Error::input(path, what));
         }
     };
     // Found out before an output folder is made.
-    std::fs::File::open(path).map_err(Error::io(path))?;
+    std::fs::File::open(&file).map_err(Error::io(&file))?;
     Ok(found)
 }
 
@@ -69,11 +91,24 @@ fn stack(text: &str) -> Result<Input> {
     text.split('+').map(one).collect::<Result<_>>().map(Input::Stack)
 }
 
+/// How inputs that are no scenes are read.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Reading {
+    pub(super) depth: DepthReading,
+    /// Where a cloud is placed; none: where its file says.
+    pub(super) placement: Option<Placement>,
+    /// Whether a cloud's phases are those that were typed.
+    pub(super) is_phase_typed: bool,
+    /// Distance of the viewer's eye [m].
+    pub(super) viewer: f64,
+}
+
 /// Points with what is known of them.
 pub(super) struct Points {
     pub(super) cloud: PointCloud,
     pub(super) metadata: ply::Metadata,
-    pub(super) scene: Option<ScenePoints>,
+    /// The scene in its light, and as points.
+    pub(super) scene: Option<(LitScene, ScenePoints)>,
     /// Eye to which the phases are those of paths, if they are.
     pub(super) path_eye: Option<DVec3>,
 }
@@ -93,7 +128,7 @@ impl Points {
     pub(super) fn load(
         input: &Input,
         settings: &SceneSettings,
-        depth_scale: DepthScale,
+        reading: &Reading,
         setup: &Setup,
         progress: &Progress,
         report: &mut Report,
@@ -105,11 +140,12 @@ impl Points {
         let begin = Instant::now();
         let points = match input {
             Input::Scene(path) => {
-                let scene = pipeline::points(path, settings, setup, progress)?;
+                let lit = pipeline::scene(path, settings, progress)?;
+                let scene = pipeline::points(&lit, settings, setup, progress)?;
                 report_light(&scene, begin.elapsed().as_secs_f64(), report);
-                return Ok(Self::of_scene(path, scene, settings.phase));
+                return Ok(Self::of_scene(path, lit, scene, settings.phase));
             }
-            Input::Points(path) => Self::read(path, report)?,
+            Input::Points(path) => Self::read(path, reading, settings.phase, setup, report)?,
             Input::Images(rgb, depth) => {
                 let seed = match settings.phase {
                     Phase::Zero => None,
@@ -119,7 +155,9 @@ impl Points {
                         return Err(Error::parameter("phase", what));
                     }
                 };
-                let cloud = images::read(rgb, depth, depth_scale, &settings.placement, seed, &setup.grid)?;
+                let picture = RgbDepth::read(rgb, depth, &reading.depth, &settings.placement)?;
+                report_map(&picture.map, report);
+                let cloud = images::points(&picture, &settings.placement, seed, &setup.grid)?;
                 let metadata = ply::Metadata { scene: rgb.display().to_string(), ..ply::Metadata::default() };
                 Self { cloud, metadata, scene: None, path_eye: None }
             }
@@ -127,7 +165,7 @@ impl Points {
                 let what = "a focal stack has no points; `compute` takes it, and `encode` and `reconstruct` its field";
                 return Err(Error::parameter("input", what));
             }
-            Input::Field(path) | Input::Frame(path) => {
+            Input::Field(path) | Input::Frame(path) | Input::Views(path) => {
                 let what = "is no scene, point cloud or picture with depth (rgb.png+depth.png)";
                 return Err(Error::input(path, what));
             }
@@ -136,7 +174,7 @@ impl Points {
         Ok(points)
     }
 
-    fn of_scene(path: &Path, scene: ScenePoints, phase: Phase) -> Self {
+    fn of_scene(path: &Path, lit: LitScene, scene: ScenePoints, phase: Phase) -> Self {
         let placing = &scene.view.placing;
         let metadata = ply::Metadata {
             frame: ply::Frame::Hologram,
@@ -147,24 +185,60 @@ impl Points {
             phase: format!("{phase:?}"),
         };
         let path_eye = scene.path_eye(phase);
-        Self { cloud: scene.placed.cloud.clone(), metadata, scene: Some(scene), path_eye }
+        Self { cloud: scene.placed.cloud.clone(), metadata, scene: Some((lit, scene)), path_eye }
     }
 
-    fn read(path: &Path, report: &mut Report) -> Result<Self> {
-        let read = ply::read(path)?;
+    /// A cloud where its file says, or where it is placed.
+    fn read(path: &Path, reading: &Reading, phase: Phase, setup: &Setup, report: &mut Report) -> Result<Self> {
+        let placement = reading.placement.as_ref();
+        let read = clouds::read(path)?;
         report.warn(read.warnings.iter().map(|w| format!("{}: {w}", path.display())));
-        if read.metadata.as_ref().is_some_and(|m| m.frame == ply::Frame::World) {
-            let what = "its points stand in the scene's own metres; write them with --frame hologram";
+        if !read.origin.is_empty() {
+            report.add("read", &read.origin, format!("{:<12} {}", "read", read.origin));
+        }
+        let (mut cloud, mut metadata) = (read.cloud, read.metadata.unwrap_or_default());
+        if metadata.frame == ply::Frame::World && placement.is_none() {
+            let what = "its points stand in the scene's own metres; write them with --frame hologram, or place them by \
+                        --placement model";
             return Err(Error::input(path, what));
         }
-        if read.cloud.points.is_empty() {
+        if cloud.points.is_empty() {
             return Err(Error::input(path, "has no points"));
         }
-        if read.cloud.points.iter().all(|p| p.amplitude == 0.0) {
+        if cloud.points.iter().all(|p| p.amplitude == 0.0) {
             return Err(Error::input(path, "all its points are dark: no amplitude is above zero"));
         }
-        let metadata = read.metadata.unwrap_or_default();
-        let path_eye = metadata.eye.filter(|_| metadata.phase == format!("{:?}", Phase::Path)).map(DVec3::from_array);
-        Ok(Self { cloud: read.cloud, metadata, scene: None, path_eye })
+        let mut path_eye =
+            metadata.eye.filter(|_| metadata.phase == format!("{:?}", Phase::Path)).map(DVec3::from_array);
+        if let Some(placement) = placement {
+            let placed =
+                placement.place_cloud(&mut cloud, &setup.grid).map_err(|e| Error::input(path, e.to_string()))?;
+            let said = placed.to_string();
+            report.add("placed", &said, format!("{:<12} {said}", "placed"));
+            metadata = ply::Metadata {
+                frame: ply::Frame::Hologram,
+                eye: Some(placed.eye.to_array()),
+                window: Some(placed.window.to_array()),
+                ..metadata
+            };
+            path_eye = None;
+        }
+        if reading.is_phase_typed {
+            let eye = DVec3::new(0.0, 0.0, reading.viewer);
+            for (index, point) in cloud.points.iter_mut().enumerate() {
+                point.phase = phase.of(index, (eye - point.position).length(), setup.wavelength);
+            }
+            path_eye = (phase == Phase::Path).then_some(eye);
+            metadata.phase = format!("{phase:?}");
+        }
+        let reach = Reach::of(&cloud, &setup.grid, setup.wavelength);
+        if reach.reaching == 0 {
+            let what = format!("{reach}; place them by --placement model --distance -150mm, or --scale (see --help)");
+            return Err(Error::input(path, what));
+        }
+        if reach.reaching < cloud.points.len() {
+            report.warn([format!("{}: {reach}", path.display())]);
+        }
+        Ok(Self { cloud, metadata, scene: None, path_eye })
     }
 }

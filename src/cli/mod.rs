@@ -8,6 +8,8 @@ mod calibrate;
 #[cfg(feature = "display")]
 mod controls;
 mod encode;
+mod eye;
+mod field;
 mod holograms;
 mod layers;
 mod light;
@@ -15,6 +17,7 @@ mod light;
 mod live;
 mod load;
 mod monitors;
+mod output;
 mod pictures;
 mod print;
 mod reconstruct;
@@ -27,7 +30,11 @@ mod segment_views;
 mod sequence;
 mod serve;
 mod show;
+mod shown;
+mod standard;
 mod steps;
+#[cfg(feature = "display")]
+mod tracker;
 mod usage;
 
 use args::{Cli, Command};
@@ -52,7 +59,7 @@ pub(crate) fn main() -> ExitCode {
         usage::tell(&mut cli.command, &typed);
         Ok(cli)
     });
-    let cli = match parsed {
+    let mut cli = match parsed {
         Ok(cli) => cli,
         Err(refused) if matches!(refused.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
             // Help into a closed pipe (`holodrive --help | head -1`) is no failure.
@@ -60,13 +67,20 @@ pub(crate) fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(refused) => {
-            eprintln!("{}", refusal::of_flags(&refused));
+            eprintln!("{}", refusal::one_line(&refusal::of_flags(&refused)));
             return ExitCode::from(2);
         }
     };
     let json = cli.json;
+    let standard = standard::asked(&mut cli.command);
+    // What is done of a plate stays.
+    let kept = match &cli.command {
+        Command::Print(args) => args.output.clone(),
+        _ => None,
+    };
     let outcome = match cli.command {
         Command::Points(args) => steps::points(&args),
+        Command::Views(args) => eye::views(&args),
         Command::Compute(args) => steps::compute(&args),
         Command::Propagate(args) => steps::propagate(&args),
         Command::Encode(args) => encode::encode(&args),
@@ -79,10 +93,18 @@ pub(crate) fn main() -> ExitCode {
         Command::Monitors(args) => monitors::monitors(&args),
         Command::Doctor(args) => monitors::doctor(&args),
     };
-    match outcome.and_then(|report| report.print(json)) {
+    match outcome.and_then(|report| standard::end(standard, report, json)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("{}", refusal::of_work(&error));
+            match (&error, kept) {
+                (Error::Interrupted, Some(folder)) => {
+                    let folder = folder.display();
+                    eprintln!(
+                        "holodrive: interrupted; the tiles that are done are kept in {folder}: the same command goes on from there"
+                    );
+                }
+                _ => eprintln!("{}", refusal::one_line(&refusal::of_work(&error))),
+            }
             ExitCode::from(if matches!(error, Error::Interrupted) { 130 } else { 2 })
         }
     }

@@ -28,8 +28,8 @@ pub(super) fn scene_options(file: &FileArgs, bounces: u32, photons: u32, white: 
         Some(White::At(white)) if white > 0.0 && white.is_finite() => Some(white),
         Some(White::At(white)) => return Err(Error::out_of_range("white", white, "must be greater than zero")),
     };
-    let FileArgs { camera, animation, time, viewer_light } = file.clone();
-    Ok(SceneOptions { camera, animation, time, viewer_light, bounces, photons, white })
+    let FileArgs { camera, animation, time, viewer_light, allow_outside } = file.clone();
+    Ok(SceneOptions { camera, animation, time, viewer_light, allow_outside, bounces, photons, white })
 }
 
 fn resolved(args: &PrintArgs) -> Result<PrintSettings> {
@@ -88,6 +88,10 @@ fn compute(settings: PrintSettings, json: bool) -> Result<Report> {
         done.finished,
         done.tiles
     ));
+    if work.inexact > 0 {
+        let (fields, bound) = (work.inexact, work.error_bound);
+        report.warn([format!("{fields} fields of segments may err by more than was asked, by {bound:.1e} at most")]);
+    }
     if done.computed > 0 {
         let line = format!(
             "rate         {:.2e} pixels/s; field {:.2e} point-pixel pairs/s; rays {}, field {}, fringe {}",

@@ -2,8 +2,10 @@
 
 use super::args::ReconstructArgs;
 use super::bar::Bar;
+use super::field::{For, Held};
 use super::holograms::named;
 use super::load::{Input, input};
+use super::output;
 use super::report::{Report, seconds};
 use glam::DVec2;
 use holodrive::field::npy;
@@ -21,44 +23,19 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
     let mut report = Report::new("reconstruct");
     report.warn(&args.idle);
     let bar = Bar::new();
+    output::check(&args.output, &output::PICTURES)?;
+    let profile = args.panel.as_deref().map(PanelProfile::find).transpose()?;
+    let progress = &bar.progress;
+    let wanted = For { flags: &args.field, panel: profile.as_ref(), wavelength: args.wavelength, progress };
     let (ExposureLight { field, settings, .. }, content) = match input(&args.input)? {
-        Input::Field(path) => {
-            let profile = args.panel.as_deref().map(PanelProfile::find).transpose()?;
-            let pitch = profile.as_ref().map(|p| [p.pitch_x, p.pitch_y]);
-            let beside = npy::read_metadata(&path)?;
-            let wavelength = args
-                .wavelength
-                .or(beside.as_ref().map(|m| m.wavelength))
-                .or(profile.as_ref().map(PanelProfile::default_wavelength));
-            let (field, metadata) = npy::read_field(&path, pitch, wavelength)?;
-            (ExposureLight { field, settings: ViewSettings::default(), laser: 0 }, metadata.content)
-        }
-        Input::Frame(path) => {
-            let profile = args.panel.as_deref().map(PanelProfile::find).transpose()?;
-            let (frame, warnings) = Frame::read(&path, profile.as_ref(), args.wavelength)?;
-            report.warn(warnings);
-            let typed = &args.simulation;
-            let wavefront_error =
-                typed.wavefront_error.as_deref().map(|path| Wavefront::read(path, None)).transpose()?;
-            let faults = Faults { crosstalk: typed.crosstalk, wavefront_error, ..Faults::default() };
-            let simulation = Simulation { subsamples: typed.subpixels, faults, ..Simulation::default() };
-            let bench = Bench { simulation, zero_order_stop: typed.zero_order_stop };
-            let light = pipeline::light(&frame, &bench, &bar.progress)?;
-            if let Some(encoding) = &frame.metadata.encoding {
-                let share = orders(&light.field, encoding);
-                let line = format!(
-                    "light        {:.1} % object, {:.1} % zero order, {:.1} % conjugate, {:.1} % elsewhere (simulated)",
-                    100.0 * share.object,
-                    100.0 * share.zero,
-                    100.0 * share.conjugate,
-                    100.0 * share.rest
-                );
-                report.add("orders", share, line);
+        Input::Field(path) => match wanted.read(&path, &mut report)? {
+            Held::Field { field, content, .. } => {
+                (ExposureLight { field, settings: ViewSettings::default(), laser: 0 }, content)
             }
-            let content = npy::Content { depth: frame.metadata.origin.depth, ..npy::Content::default() };
-            (light, content)
-        }
-        _ => return Err(Error::input(&args.input, "is neither a frame (.png, .bmp) nor a field (.npy)")),
+            Held::Levels(frame) => light_of(args, &frame, progress, &mut report)?,
+        },
+        Input::Frame(path) => light_of(args, &wanted.frame(&path, &mut report)?, progress, &mut report)?,
+        _ => return Err(Error::input(&args.input, "is neither a frame (.png, .bmp) nor a field (.npy, .mat, .h5)")),
     };
     let view = match (args.eye, args.focus, args.distance) {
         (Some(position), Some(focus), _) => {
@@ -106,6 +83,33 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
     );
     report.output("picture", &args.output);
     Ok(report)
+}
+
+/// The light of a frame on the simulated panel, and where its content stands.
+fn light_of(
+    args: &ReconstructArgs,
+    frame: &Frame,
+    progress: &Progress,
+    report: &mut Report,
+) -> Result<(ExposureLight, npy::Content)> {
+    let typed = &args.simulation;
+    let wavefront_error = typed.wavefront_error.as_deref().map(|path| Wavefront::read(path, None)).transpose()?;
+    let faults = Faults { crosstalk: typed.crosstalk, wavefront_error, ..Faults::default() };
+    let simulation = Simulation { subsamples: typed.subpixels, faults, ..Simulation::default() };
+    let bench = Bench { simulation, zero_order_stop: typed.zero_order_stop };
+    let light = pipeline::light(frame, &bench, progress)?;
+    if let Some(encoding) = &frame.metadata.encoding {
+        let share = orders(&light.field, encoding);
+        let line = format!(
+            "light        {:.1} % object, {:.1} % zero order, {:.1} % conjugate, {:.1} % elsewhere (simulated)",
+            100.0 * share.object,
+            100.0 * share.zero,
+            100.0 * share.conjugate,
+            100.0 * share.rest
+        );
+        report.add("orders", share, line);
+    }
+    Ok((light, npy::Content { depth: frame.metadata.origin.depth, ..npy::Content::default() }))
 }
 
 /// Places of the eye, beside each other and one above the other, and the box that they fill [m].

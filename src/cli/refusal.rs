@@ -41,9 +41,51 @@ pub(super) fn of_flags(refused: &clap::Error) -> String {
     format!("holodrive: {words}{meant} (see {path} --help)")
 }
 
+/// The system's words without its number: what it means stands before it.
+fn without_number(said: &str) -> String {
+    let Some((before, rest)) = said.split_once(" (os error ") else { return said.to_owned() };
+    match rest.split_once(')') {
+        Some((number, after)) if number.parse::<i32>().is_ok() && !before.is_empty() => format!("{before}{after}"),
+        _ => said.to_owned(),
+    }
+}
+
+/// Longest line that is said [characters]: the beginning and the end of a longer one.
+const LONGEST: usize = 1200;
+
+/// One line without control characters, whatever of a file or a flag is quoted in it, and of a bounded length.
+pub(super) fn one_line(text: &str) -> String {
+    let mut line = String::with_capacity(text.len().min(4 * LONGEST));
+    let mut letters = text.chars().peekable();
+    let mut count = 0;
+    while let Some(letter) = letters.next() {
+        match letter {
+            '\n' | '\r' | '\t' | ' ' => {
+                while letters.next_if(|next| next.is_whitespace()).is_some() {}
+                line.push(' ');
+            }
+            // Other than spaces and letters: what steers a terminal, or turns the direction of writing.
+            '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{2028}' | '\u{2029}' => line.push('\u{fffd}'),
+            letter if letter.is_control() => line.push_str(&letter.escape_default().to_string()),
+            letter => line.push(letter),
+        }
+        count += 1;
+        if count == 4 * LONGEST {
+            break;
+        }
+    }
+    let length = line.chars().count();
+    if length > LONGEST || letters.peek().is_some() {
+        let head: String = line.chars().take(LONGEST * 3 / 4).collect();
+        let tail: String = text.chars().rev().take(LONGEST / 8).collect::<Vec<_>>().into_iter().rev().collect();
+        return format!("{head} … {}", tail.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>());
+    }
+    line.trim_end().to_owned()
+}
+
 /// An error of the library; a setting that the command has a flag for is called by the flag's name.
 pub(super) fn of_work(error: &Error) -> String {
-    let said = error.to_string();
+    let said = without_number(&error.to_string());
     let (Error::Parameter { name, .. } | Error::OutOfRange { name, .. }) = error else {
         return format!("holodrive: {said}");
     };
@@ -53,5 +95,19 @@ pub(super) fn of_work(error: &Error) -> String {
     match said.strip_prefix(name) {
         Some(rest) if known => format!("holodrive: --{long}{rest}"),
         _ => format!("holodrive: {said}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_quoted_stays_on_one_line_of_bounded_length() {
+        let said = one_line("a.ply: header\x1b[31m line\r\n  3\u{7}: \u{202e}x");
+        assert_eq!(said, "a.ply: header\\u{1b}[31m line 3\\u{7}: \u{fffd}x");
+        let long = one_line(&format!("first {} last", "x\n".repeat(900_000)));
+        assert!(long.chars().count() < 1300 && long.starts_with("first") && long.ends_with("last"), "{}", long.len());
+        assert_eq!(one_line("9.4e-4 for µm × 2"), "9.4e-4 for µm × 2");
     }
 }

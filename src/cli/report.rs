@@ -1,5 +1,6 @@
 //! What a command did: lines for people, JSON for machines.
 
+use super::bar::aside;
 use holodrive::units::show_length;
 use holodrive::{Error, Result, files};
 use serde::Serialize;
@@ -68,12 +69,16 @@ impl Report {
     /// Adds warnings; they go to standard error at once, and into the JSON.
     pub(crate) fn warn<W: ToString>(&mut self, warnings: impl IntoIterator<Item = W>) {
         for warning in warnings {
-            let warning = warning.to_string();
+            let warning = super::refusal::one_line(&warning.to_string());
             if !self.warnings.contains(&warning) {
-                eprintln!("warning: {warning}");
+                aside(&format!("warning: {warning}"));
                 self.warnings.push(warning);
             }
         }
+    }
+    /// Tells people at once what is about to begin, on standard error.
+    pub(crate) fn begins(&self, line: &str) {
+        eprintln!("{line}");
     }
     /// Warns of a typed depth on the other side of the panel than all of the content: with a wrong sign the picture is out
     /// of focus, and nothing else tells.
@@ -112,13 +117,19 @@ impl Report {
         all.insert("warnings".into(), self.warnings.clone().into());
         Value::Object(all)
     }
+    fn text(&self, json: bool) -> String {
+        if json {
+            return serde_json::to_string_pretty(&self.json()).unwrap_or_default() + "\n";
+        }
+        self.lines.iter().flat_map(|line| [line.as_str(), "\n"]).collect()
+    }
+    /// Prints it on standard error, where standard output is taken.
+    pub(crate) fn print_aside(&self, json: bool) {
+        eprint!("{}", self.text(json));
+    }
     /// Prints it on standard output.
     pub(crate) fn print(&self, json: bool) -> Result<()> {
-        let text = if json {
-            serde_json::to_string_pretty(&self.json()).unwrap_or_default() + "\n"
-        } else {
-            self.lines.iter().flat_map(|line| [line.as_str(), "\n"]).collect()
-        };
+        let text = self.text(json);
         match std::io::stdout().write_all(text.as_bytes()) {
             // A reader that has seen enough (`| head`) is no failure.
             Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),

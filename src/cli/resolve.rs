@@ -1,18 +1,23 @@
 //! What was typed, resolved: the panel in its light, and the settings of each step.
 
-use super::args::{ColorArgs, EncodingArgs, HologramArgs, PanelArgs, PlacementArg, PlacementArgs, SceneArgs, ShowArgs};
-use super::args::{Wavelengths, White};
+use super::args::{ColorArgs, DepthMapArgs, EncodingArgs, HologramArgs, PanelArgs, PlacementArg, PlacementArgs};
+use super::args::{SceneArgs, ShowArgs};
+use super::args::{ViewerArgs, Wavelengths, White};
+use super::load::Reading;
 use super::report::Report;
+use glam::{DVec2, DVec3};
 use holodrive::encode::{EncodeOptions, Encoding, Reference};
 use holodrive::hologram::HologramSettings;
 use holodrive::illumination::IlluminationSettings;
+use holodrive::light_field::{LightField, Pupil, Retina, Viewer};
 use holodrive::names::Named;
 use holodrive::panel::{Correction, PanelProfile, Setup, Wavefront};
 use holodrive::pipeline::{Bench, Settings};
-use holodrive::points::placement::{Phase, SequenceAnchors};
+use holodrive::points::placement::SequenceAnchors;
 use holodrive::points::trace::TraceSettings;
 use holodrive::points::{Multiplexing, Placement, SceneSettings, SubFrames, WhitePoint};
 use holodrive::scene::gltf::{Choice, Clip, LoadOptions};
+use holodrive::units::show_length;
 use holodrive::{Error, Result};
 use std::path::Path;
 
@@ -68,6 +73,7 @@ pub(super) fn scene(light: &SceneArgs, placement: &PlacementArgs, default_white:
             clip: light.file.animation.as_deref().map_or(Clip::First, |name| Clip::Of(Choice::from(name))),
             time: light.file.time,
             viewer_light: light.file.viewer_light,
+            allow_outside: light.file.allow_outside,
             ..LoadOptions::default()
         },
         illumination: IlluminationSettings {
@@ -88,10 +94,7 @@ pub(super) fn scene(light: &SceneArgs, placement: &PlacementArgs, default_white:
         },
         points: light.points,
         placement: self::placement(placement),
-        phase: match placement.phase {
-            Phase::Random { .. } => Phase::Random { seed: light.random.seed },
-            other => other,
-        },
+        phase: placement.phase(light.random.seed),
         white: match light.white.unwrap_or(default_white) {
             White::Auto => WhitePoint::Auto,
             White::None => WhitePoint::Unlimited,
@@ -102,9 +105,19 @@ pub(super) fn scene(light: &SceneArgs, placement: &PlacementArgs, default_white:
 }
 
 pub(super) fn placement(args: &PlacementArgs) -> Placement {
-    match args.placement {
-        PlacementArg::Window => Placement::Window { eye: args.viewer, near: args.near, far: args.far },
-        PlacementArg::Model => Placement::Model { eye: args.viewer, z: args.distance, scale: args.scale },
+    match args.kind() {
+        PlacementArg::Window => Placement::Window { eye: args.viewer, near: args.near(), far: args.far() },
+        PlacementArg::Model => Placement::Model { eye: args.viewer, z: args.distance(), scale: args.scale },
+    }
+}
+
+/// How inputs that are no scenes are read.
+pub(super) fn reading(map: &DepthMapArgs, placement: &PlacementArgs) -> Reading {
+    Reading {
+        depth: map.reading(),
+        placement: placement.is_asked().then(|| self::placement(placement)),
+        is_phase_typed: placement.phase.is_some(),
+        viewer: placement.viewer,
     }
 }
 
@@ -112,10 +125,10 @@ pub(super) fn hologram(args: &HologramArgs) -> HologramSettings {
     HologramSettings { error: args.error, method: args.engine, memory: args.memory, ..HologramSettings::default() }
 }
 
-/// The encoding that was chosen, or the panel's usual one, with the settings that were typed; those of another encoding are
+/// The encoding that was chosen, or the usual one, with the settings that were typed; those of another encoding are
 /// refused by name.
-pub(super) fn encode(args: &EncodingArgs, setup: &Setup) -> Result<EncodeOptions> {
-    let mut encoding = args.encoding.clone().unwrap_or_else(|| Encoding::usual(setup.profile.modulation()));
+pub(super) fn encode(args: &EncodingArgs, usual: Encoding) -> Result<EncodeOptions> {
+    let mut encoding = args.encoding.clone().unwrap_or(usual);
     let chosen = encoding.name();
     let without = |flag: &'static str| Err(Error::parameter(flag, format!("{chosen} has no use for it; leave it out")));
     if let Some(angles) = args.reference_angle {
@@ -138,6 +151,17 @@ pub(super) fn encode(args: &EncodingArgs, setup: &Setup) -> Result<EncodeOptions
         }
         _ if !args.depths.is_empty() => return without("depths"),
         _ if args.start.is_some() => return without("start"),
+        Encoding::View(view) => {
+            view.iterations = iterations;
+            let typed = [
+                ("blaze", args.blaze.is_some()),
+                ("lens", args.lens.is_some()),
+                ("band-stop", args.band_stop.is_some()),
+            ];
+            if let Some((flag, _)) = typed.into_iter().find(|(_, typed)| *typed) {
+                return without(flag);
+            }
+        }
         Encoding::Gradient(gradient) => gradient.iterations = iterations.unwrap_or(gradient.iterations),
         _ if iterations.is_some() => return without("iterations"),
         _ => {}
@@ -150,20 +174,66 @@ pub(super) fn encode(args: &EncodingArgs, setup: &Setup) -> Result<EncodeOptions
     })
 }
 
-/// All steps of `show`, and the panel with the correction that was named.
-pub(super) fn settings(args: &ShowArgs, setup: Setup) -> Result<(Setup, Settings)> {
+/// Where the eye stands: on its axis at --viewer, if nothing else is said.
+pub(super) fn viewer(args: &ViewerArgs, placement: Option<&PlacementArgs>, views: Option<&LightField>) -> Viewer {
+    let mut viewer = Viewer::default();
+    if let Some(placement) = placement {
+        viewer.eye.z = placement.viewer;
+    }
+    if let Some(views) = views {
+        viewer.eye = views.eyes.center.extend(views.eyes.distance);
+    }
+    viewer.eye = args.eye.map_or(viewer.eye, DVec3::from_array);
+    viewer.pupil = args.pupil;
+    viewer.eye_box = args.eye_box.map_or(viewer.eye_box, DVec2::from_array);
+    viewer
+}
+
+/// Several frames for one picture, if there are several.
+pub(super) fn sub_frames(count: usize, sparse: bool, seed: u64) -> Result<Option<SubFrames>> {
+    let multiplexing = if sparse { Multiplexing::Sparse } else { Multiplexing::Phases };
+    if count == 1 { Ok(None) } else { SubFrames::new(count, multiplexing, seed).map(Some) }
+}
+
+/// Refuses what a light field is not for.
+pub(super) fn check_viewer(viewer: &Viewer, setup: &Setup) -> Result<()> {
+    Retina::of(viewer, &setup.grid, setup.wavelength)?;
+    let half_angle = setup.wavelength / (2.0 * setup.grid.pitch_x.max(setup.grid.pitch_y));
+    let reach = half_angle * viewer.eye.z;
+    if viewer.eye.x.abs() > 2.0 * reach || viewer.eye.y.abs() > 2.0 * reach {
+        let place = format!("{}, {}", show_length(viewer.eye.x), show_length(viewer.eye.y));
+        let limit = format!("is out of reach: the panel sends its light to ±{} there", show_length(reach));
+        return Err(Error::out_of_range("eye", place, limit));
+    }
+    Ok(())
+}
+
+/// Refuses a viewer that frames in time are not made for.
+pub(super) fn check_in_time(settings: &Settings, setup: &Setup) -> Result<()> {
+    match settings.encode.encoding {
+        Some(Encoding::View(_)) if settings.viewer.pupil == Pupil::All => {
+            Err(Error::parameter("pupil", "all: frames in time are made for a pupil with a diameter"))
+        }
+        Some(Encoding::View(_)) => check_viewer(&settings.viewer, setup),
+        _ => Ok(()),
+    }
+}
+
+/// All steps of `show`, and the panel with the correction that was named; `usual` is the encoding where none is.
+pub(super) fn settings(args: &ShowArgs, setup: Setup, usual: Encoding) -> Result<(Setup, Settings)> {
     let setup = Setup { correction: correction(args.encoding.correction.as_deref())?, ..setup };
-    let multiplexing = if args.sparse { Multiplexing::Sparse } else { Multiplexing::Phases };
-    let sub_frames = match args.subframes {
-        1 => None,
-        count => Some(SubFrames::new(count, multiplexing, args.light.random.seed)?),
-    };
+    let sub_frames = sub_frames(args.subframes, args.sparse, args.light.random.seed)?;
+    let mut encode = encode(&args.encoding, usual)?;
+    if let Some(Encoding::View(view)) = &mut encode.encoding {
+        view.seed = args.light.random.seed;
+    }
     let settings = Settings {
         scene: scene(&args.light, &args.placement, White::Auto),
-        channel: args.hologram.channel,
+        channel: args.channel.channel,
         sub_frames,
         hologram: hologram(&args.hologram),
-        encode: encode(&args.encoding, &setup)?,
+        encode,
+        viewer: viewer(&args.viewer, Some(&args.placement), None),
         bench: Bench { zero_order_stop: args.zero_order_stop, ..Bench::default() },
     };
     Ok((setup, settings))

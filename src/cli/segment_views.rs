@@ -4,7 +4,7 @@ use super::args::{ComputeArgs, PlacementArg, PlacementArgs};
 use super::load::Input;
 use super::print::scene_options;
 use super::report::{Report, count, seconds};
-use holodrive::field::npy;
+use holodrive::field::{npy, stored};
 use holodrive::panel::Setup;
 use holodrive::progress::Progress;
 use holodrive::segments::{Object, ObjectWave, Segments, Viewing};
@@ -20,13 +20,14 @@ pub(super) fn compute(
 ) -> Result<()> {
     let refused = |what: &str| Err(Error::parameter("views", what));
     let Input::Scene(path) = source else { return refused("are of a scene (.gltf, .glb)") };
-    if args.placement.placement != PlacementArg::Model {
+    if args.placement.kind() != PlacementArg::Model {
         return refused("are of a model that stands before or behind the panel: add --placement model");
     }
     if panel.lasers.is_some() {
         return refused("are computed in one wavelength at a time; leave --wavelengths out");
     }
-    let PlacementArgs { viewer, distance, scale, .. } = args.placement;
+    let PlacementArgs { viewer, scale, .. } = args.placement;
+    let distance = args.placement.distance();
     let plane = Segments {
         view: Viewing { viewer, place: distance, scale, ..Viewing::default() },
         error: args.hologram.error,
@@ -39,6 +40,10 @@ pub(super) fn compute(
     let depths = object.depths();
     let seen = ObjectWave::new(plane, object).whole(progress)?;
     let work = &seen.work;
+    if work.inexact > 0 {
+        let (fields, bound) = (work.inexact, work.error_bound);
+        report.warn([format!("{fields} fields of segments may err by more than was asked, by {bound:.1e} at most")]);
+    }
     report.add_serialised(
         "views",
         work,
@@ -53,7 +58,7 @@ pub(super) fn compute(
     );
     let content = npy::Content { depth: Some(depths), eye: Some([0.0, 0.0, viewer]), ..npy::Content::default() };
     let origin = format!("true views of {}", args.input.display());
-    npy::write_field(&args.output, &seen.field, &content, &origin)?;
+    stored::write_field(&args.output, &seen.field, &content, &origin)?;
     report.output("field", &args.output);
     Ok(())
 }

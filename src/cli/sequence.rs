@@ -9,10 +9,12 @@ use super::resolve;
 #[cfg(feature = "display")]
 use holodrive::display::{DisplayFrame, PlaySettings};
 use holodrive::field::npy_stack::LevelStack;
+use holodrive::light_field::LightField;
 use holodrive::panel::{Frame, PanelProfile};
 use holodrive::pipeline::{self, Bench};
 use holodrive::progress::Progress;
 use holodrive::reconstruction::{self, Picture, View};
+use holodrive::scene::gltf;
 use holodrive::sequence::prepared::pictures_in;
 use holodrive::sequence::{ContactSheet, Prepared, Shown, Source};
 use holodrive::{Error, Result, files};
@@ -61,7 +63,7 @@ pub(super) fn asked(args: &ShowArgs) -> Result<Option<Sequence>> {
         }
         return prepared(Source::Pictures(all));
     }
-    if input.is_dir() {
+    if input.is_dir() && !LightField::is_folder(input) {
         return prepared(Source::Pictures(pictures_in(input)?));
     }
     if extension == "npy" && LevelStack::open(input)?.is_some() {
@@ -70,7 +72,7 @@ pub(super) fn asked(args: &ShowArgs) -> Result<Option<Sequence>> {
     let in_time = wanted.fps.is_some() || wanted.repeat || wanted.from.is_some() || wanted.to.is_some();
     match extension.as_str() {
         _ if !in_time && wanted.events.is_none() => Ok(None),
-        "gltf" | "glb" => Ok(Some(Sequence::Animated(input.clone()))),
+        _ if gltf::is_scene(input) => Ok(Some(Sequence::Animated(input.clone()))),
         "png" | "bmp" if !input.to_string_lossy().contains(['+', '@']) => {
             prepared(Source::Pictures(vec![input.clone()]))
         }

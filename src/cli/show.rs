@@ -1,21 +1,24 @@
 //! `show`: the whole way, with its pictures and data in one folder.
 
 use super::animate;
-use super::args::ShowArgs;
+use super::args::{DEFAULT_OUTPUT, ShowArgs};
 use super::bar::Bar;
+use super::eye;
+use super::field::{self, For, Held};
 use super::holograms::Maker;
 use super::load::{self, Input, Points};
-use super::pictures::report_gallery;
 use super::report::{Report, seconds};
 use super::resolve;
 use super::sequence::{self, Sequence};
+use super::shown::{Shown, usual};
 use super::steps::write_traced;
-use holodrive::field::npy::{self, Content};
+use holodrive::encode::Encoding;
+use holodrive::field::npy::Content;
+use holodrive::light_field::{LightField, Retina};
 use holodrive::panel::{Frame, Setup};
-use holodrive::pipeline::{self, Settings};
-use holodrive::points::{ScenePoints, ply};
+use holodrive::pipeline::Settings;
+use holodrive::points::ply;
 use holodrive::progress::Progress;
-use holodrive::reconstruction::Target;
 use holodrive::{Error, Result, files};
 use std::time::Instant;
 
@@ -28,14 +31,6 @@ pub(super) fn show(args: &ShowArgs) -> Result<Report> {
         let _ = std::fs::remove_dir(&args.output);
     }
     outcome
-}
-
-/// Frames of one picture, and what is known of it.
-struct Shown {
-    /// Those of three lasers, where there are three: none for one without light.
-    frames: Vec<Option<Frame>>,
-    content: Content,
-    scene: Option<ScenePoints>,
 }
 
 fn run(args: &ShowArgs) -> Result<Report> {
@@ -55,12 +50,22 @@ fn run(args: &ShowArgs) -> Result<Report> {
     }
     let source = load::input(&args.input)?;
     let setup = resolve::setup_in_color(&args.panel, &args.color, &mut report)?;
-    let (setup, settings) = resolve::settings(args, setup)?;
-    check(args, &source, &setup)?;
+    let usual = usual(args, &source, &setup);
+    let for_eyes = matches!(source, Input::Scene(_) | Input::Points(_) | Input::Images(..));
+    if let (true, Encoding::DoublePhase(_), None) = (for_eyes, &usual, &args.encoding.encoding) {
+        report.warn(["the panel's light does not fill the eye's pupil there: double-phase instead of view"]);
+    }
+    let (setup, settings) = resolve::settings(args, setup, usual)?;
+    check(args, &source, &setup, &settings)?;
     // A monitor that is not there is found out before the work, not after it.
     #[cfg(feature = "display")]
     let screen = super::screen::Screen::asked(args)?;
-    files::output_folder(&args.output)?;
+    // A frame that is on its way to a monitor needs no folder.
+    let is_named = args.output.as_os_str() != DEFAULT_OUTPUT;
+    let writes = args.monitor.is_none() || is_named || !matches!(source, Input::Frame(_));
+    if writes {
+        files::output_folder(&args.output)?;
+    }
     let bar = Bar::new();
     let shown = frames(args, &source, &setup, &settings, &bar.progress, &mut report)?;
     let to_frame = begin.elapsed().as_secs_f64();
@@ -70,23 +75,33 @@ fn run(args: &ShowArgs) -> Result<Report> {
         bar.progress.start("", 0);
         let frames = lit_and_dark(shown.frames, &setup)?;
         screen.show(&frames.iter().collect::<Vec<_>>(), &bar.progress, &mut report)?;
-        return report.written_to(&args.output);
+        return if writes { report.written_to(&args.output) } else { Ok(report) };
     }
-    let looked = Instant::now();
-    let scene = shown.scene.as_ref().filter(|_| settings.sub_frames.is_none());
-    let target = Target::new(shown.content, scene);
-    let frames: Vec<_> = shown.frames.iter().map(Option::as_ref).collect();
-    let gallery = pipeline::pictures(&frames, &setup, &target, &settings.bench, &bar.progress)?;
-    gallery.write(&args.output)?;
+    shown.look(args, &setup, &settings, &bar.progress, &mut report)?;
     drop(bar);
-    report_gallery(&gallery, scene, frames.len(), looked, &mut report);
     let total = begin.elapsed().as_secs_f64();
     report.add("seconds", total, format!("in all       {:>8}", seconds(total)));
     report.written_to(&args.output)
 }
 
 /// Refuses exposures that the input cannot have, or that the panel's signal cannot carry to a monitor, before the work.
-fn check(args: &ShowArgs, source: &Input, setup: &Setup) -> Result<()> {
+fn check(args: &ShowArgs, source: &Input, setup: &Setup, settings: &Settings) -> Result<()> {
+    settings.viewer.check()?;
+    if let Some(Encoding::View(_)) = settings.encode.encoding {
+        if args.sparse {
+            return Err(Error::parameter("sparse", "view finds its frames together; leave it out"));
+        }
+        if matches!(source, Input::Frame(_) | Input::Field(_) | Input::Stack(_)) {
+            let why = "view is made from the views of a scene, a point cloud, a picture with depth or a light field";
+            return Err(Error::parameter("encoding", why));
+        }
+        if !matches!(source, Input::Views(_)) {
+            resolve::check_viewer(&settings.viewer, setup)?;
+        }
+    } else if matches!(source, Input::Views(_)) {
+        let why = "a light field is shown by view, on a panel that modulates phase";
+        return Err(Error::parameter("encoding", why));
+    }
     let (flag, what, count) = match &setup.lasers {
         Some(_) => ("wavelengths", "three lasers", 3),
         None => ("subframes", "sub-frames", args.subframes),
@@ -122,43 +137,81 @@ fn frames(
     progress: &Progress,
     report: &mut Report,
 ) -> Result<Shown> {
+    let wanted = For { flags: &args.field, panel: Some(&setup.profile), wavelength: args.panel.wavelength, progress };
     let out = &args.output;
     let maker = Maker { input: &args.input, setup, settings, progress };
     match source {
         Input::Frame(path) => {
-            let profile = Some(&setup.profile).filter(|_| args.panel.panel != "generic");
-            let (frame, warnings) = match Frame::read(path, profile, args.panel.wavelength) {
-                // A foreign picture has no metadata: it is read for the default panel.
-                Err(_) if profile.is_none() => Frame::read(path, Some(&setup.profile), args.panel.wavelength)?,
-                other => other?,
-            };
-            report.warn(warnings);
+            // A foreign picture has no metadata: it is read for the default panel.
+            let named = args.panel.panel != "generic" || Frame::read(path, None, None).is_err();
+            let wanted = For { panel: Some(&setup.profile).filter(|_| named), ..wanted };
+            let frame = wanted.frame(path, report)?;
             let content = Content { depth: frame.metadata.origin.depth, ..Content::default() };
-            Ok(Shown { frames: vec![Some(frame)], content, scene: None })
+            Ok(Shown::new(vec![Some(frame)], focused(args, content, report)))
         }
-        Input::Field(path) => {
-            let pitch = [setup.grid.pitch_x, setup.grid.pitch_y];
-            let wavelength = args.panel.wavelength.or(npy::read_metadata(path)?.map(|m| m.wavelength));
-            let (field, metadata) = npy::read_field(path, Some(pitch), wavelength.or(Some(setup.wavelength)))?;
-            let frame = maker.frame(&field, &metadata.content, None, report)?;
-            frame.write(&out.join("frame.png"))?;
-            Ok(Shown { frames: vec![Some(frame)], content: metadata.content, scene: None })
+        Input::Field(path) => match wanted.read(path, report)? {
+            Held::Levels(frame) => Ok(Shown::new(vec![Some(*frame)], focused(args, Content::default(), report))),
+            Held::Field { field, content, are_phases } => {
+                let mut settings = settings.clone();
+                if args.encoding.encoding.is_none() {
+                    settings.encode.encoding = Some(field::usual(setup.profile.modulation(), are_phases));
+                }
+                let maker = Maker { settings: &settings, ..maker };
+                let content = focused(args, content, report);
+                let frame = maker.frame(&field, &content, None, report)?;
+                frame.write(&out.join("frame.png"))?;
+                Ok(Shown::new(vec![Some(frame)], content))
+            }
+        },
+        Input::Views(path) => {
+            let file = LightField::read(path)?;
+            let viewer = resolve::viewer(&args.viewer, None, Some(&file));
+            resolve::check_viewer(&viewer, setup)?;
+            let settings = Settings { viewer, ..settings.clone() };
+            let maker = Maker { settings: &settings, ..maker };
+            let light = eye::light_field(&eye::Content::Views(file), setup, &settings, progress, report)?;
+            let frames = maker.eye_frames(&light, None, out, report)?;
+            let content = Content { depth: Some(light.depth), ..Content::default() };
+            Ok(Shown { views: Some((light, viewer)), ..Shown::new(frames, content) })
         }
         _ => {
-            let scale = args.map.depth_scale;
-            let points = Points::load(source, &settings.scene, scale, setup, progress, report)?;
+            let reading = resolve::reading(&args.map, &args.placement);
+            let points = Points::load(source, &settings.scene, &reading, setup, progress, report)?;
             ply::write(&out.join("points.ply"), &points.cloud, &points.metadata)?;
-            if let Some(scene) = &points.scene {
+            if let Some((_, scene)) = &points.scene {
                 write_traced(&out.join("traced.png"), scene)?;
                 report.value("focus", &scene.view.focus);
             }
-            let frames = maker.frames(&points, out, report)?;
+            let viewer = settings.viewer;
+            // A frame for a monitor is made without pictures of it.
+            let is_view = matches!(settings.encode.encoding, Some(Encoding::View(_)));
+            let fits = Retina::of(&viewer, &setup.grid, setup.wavelength).is_ok();
+            let seen = is_view || (args.monitor.is_none() && fits);
+            let content = eye::Content::Points(&points);
+            let light = seen.then(|| eye::light_field(&content, setup, settings, progress, report)).transpose()?;
+            let frames = match &light {
+                Some(light) if is_view => maker.eye_frames(light, Some(&points), out, report)?,
+                _ => maker.frames(&points, out, report)?,
+            };
             if frames.iter().all(Option::is_none) {
                 return Err(Error::input(&args.input, "has no light for any of the lasers"));
             }
-            Ok(Shown { frames, content: points.content(), scene: points.scene })
+            let views = light.map(|light| (light, viewer));
+            Ok(Shown { frames, content: points.content(), points: Some(points), views })
         }
     }
+}
+
+/// Content that is looked at where a flag says: of other programs' fields and frames nothing else is known.
+fn focused(args: &ShowArgs, content: Content, report: &mut Report) -> Content {
+    let (flag, typed) = match (args.sequence.focus, args.placement.distance) {
+        (Some(focus), _) => ("focus", focus),
+        (None, Some(distance)) => ("distance", distance),
+        (None, None) => return content,
+    };
+    report.check_side(flag, typed, content.depth);
+    report.add("focus", typed, "");
+    Content { depth: Some([typed; 2]), ..content }
 }
 
 /// The frames in their order for a video signal; one without light has level 0 everywhere.

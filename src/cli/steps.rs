@@ -6,15 +6,16 @@ use super::holograms::Maker;
 use super::layers;
 use super::light::report_gamut;
 use super::load::{Input, Points, input};
+use super::output;
 use super::report::{Report, seconds};
 use super::resolve;
-use holodrive::field::npy;
+use holodrive::field::{npy, stored};
 use holodrive::panel::PanelProfile;
 use holodrive::pipeline::Settings;
 use holodrive::points::{Placement, ScenePoints, images, ply};
 use holodrive::propagation::{self, Propagator};
 use holodrive::reconstruction::write_rgb_png;
-use holodrive::units::show_length;
+use holodrive::units::{show_length, show_pitch};
 use holodrive::{Error, Result};
 use std::path::Path;
 use std::time::Instant;
@@ -22,6 +23,8 @@ use std::time::Instant;
 pub(super) fn points(args: &PointsArgs) -> Result<Report> {
     let mut report = Report::new("points");
     report.warn(&args.idle);
+    output::check(&args.output, &["ply"])?;
+    args.picture.as_deref().map_or(Ok(()), |picture| output::check(picture, &["npy", "png"]))?;
     let setup = resolve::setup_in_color(&args.panel, &args.color, &mut report)?;
     let source = input(&args.scene)?;
     let no_scene = || Error::input(&args.scene, "is no scene: .gltf or .glb");
@@ -30,13 +33,13 @@ pub(super) fn points(args: &PointsArgs) -> Result<Report> {
     }
     let bar = Bar::new();
     let settings = resolve::scene(&args.light, &args.placement, White::None);
-    let scale = args.map.depth_scale;
-    let points = Points::load(&source, &settings, scale, &setup, &bar.progress, &mut report)?;
+    let reading = resolve::reading(&args.map, &args.placement);
+    let points = Points::load(&source, &settings, &reading, &setup, &bar.progress, &mut report)?;
     if let Some(lasers) = &setup.lasers {
         report_gamut(lasers, &lasers.gamut(&points.cloud), &mut report);
     }
     let (mut cloud, mut metadata) = (points.cloud, points.metadata);
-    let scene = points.scene.ok_or_else(no_scene)?;
+    let (_, scene) = points.scene.ok_or_else(no_scene)?;
     if args.frame == ply::Frame::World {
         metadata = ply::Metadata { frame: ply::Frame::World, eye: None, window: None, ..metadata };
         for (point, world) in cloud.points.iter_mut().zip(&scene.world) {
@@ -54,7 +57,7 @@ pub(super) fn points(args: &PointsArgs) -> Result<Report> {
             return Err(Error::parameter("depth-map", what));
         };
         let size = [scene.view.width as u32, scene.view.height as u32];
-        images::write_depths(map, size, &scene.view.depths, scale, [near, far])?;
+        images::write_depths(map, size, &scene.view.depths, args.map.depth_scale.unwrap_or_default(), [near, far])?;
         report.file("depth_map", "depth map", map);
     }
     ply::write(&args.output, &cloud, &metadata)?;
@@ -76,6 +79,7 @@ pub(super) fn write_traced(path: &Path, scene: &ScenePoints) -> Result<()> {
 pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
     let mut report = Report::new("compute");
     report.warn(&args.idle);
+    output::check(&args.output, &output::FIELDS)?;
     let setup = resolve::setup_in_color(&args.panel, &args.color, &mut report)?;
     let bar = Bar::new();
     let source = input(&args.input)?;
@@ -89,12 +93,12 @@ pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
     }
     let settings = Settings {
         scene: resolve::scene(&args.light, &args.placement, White::Auto),
-        channel: args.hologram.channel,
+        channel: args.channel.channel,
         hologram: resolve::hologram(&args.hologram),
         ..Settings::default()
     };
-    let scale = args.map.depth_scale;
-    let points = Points::load(&source, &settings.scene, scale, &setup, &bar.progress, &mut report)?;
+    let reading = resolve::reading(&args.map, &args.placement);
+    let points = Points::load(&source, &settings.scene, &reading, &setup, &bar.progress, &mut report)?;
     let maker = Maker { input: &args.input, setup: &setup, settings: &settings, progress: &bar.progress };
     maker.fields(&points, &args.output, &mut report)?;
     Ok(report)
@@ -102,10 +106,23 @@ pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
 
 pub(super) fn propagate(args: &PropagateArgs) -> Result<Report> {
     let mut report = Report::new("propagate");
+    output::check(&args.output, &output::FIELDS)?;
     let profile = args.panel.as_deref().map(PanelProfile::find).transpose()?;
     let pitch = args.pitch.or(profile.as_ref().map(|p| [p.pitch_x, p.pitch_y]));
     let wavelength = args.wavelength.or(profile.as_ref().map(PanelProfile::default_wavelength));
-    let (field, metadata) = npy::read_field(&args.input, pitch, wavelength)?;
+    let held = stored::read(&args.input)?;
+    report.warn(&held.warnings);
+    let (field, metadata) = held.field(&args.input, pitch, wavelength)?;
+    if let Some(own) = &held.metadata {
+        let other = |own: f64, now: f64| (own - now).abs() > 1e-6 * now;
+        let [pitch, light] = [field.grid.pitch(), [field.wavelength; 2]];
+        if other(own.pitch[0], pitch[0]) || other(own.pitch[1], pitch[1]) || other(own.wavelength, light[0]) {
+            let [its, taken] = [(own.pitch, own.wavelength), (pitch, light[0])]
+                .map(|(pitch, wavelength)| format!("{} at {}", show_pitch(pitch), show_length(wavelength)));
+            report.warn([format!("{}: made for {its}, taken for {taken}", args.input.display())]);
+        }
+    }
+    report.add("read", &held.origin, format!("{:<12} {}", "read", held.origin));
     let bar = Bar::new();
     let begin = Instant::now();
     bar.progress.start("propagate", 0);
@@ -113,7 +130,7 @@ pub(super) fn propagate(args: &PropagateArgs) -> Result<Report> {
     let planned = Propagator::new(field.grid, field.grid, settings)?;
     let out = planned.propagate(&field, args.distance, &bar.progress)?;
     let content = npy::Content { z: metadata.content.z + args.distance, ..metadata.content };
-    npy::write_field(&args.output, &out, &content, &metadata.origin)?;
+    stored::write_field(&args.output, &out, &content, &metadata.origin)?;
     let elapsed = begin.elapsed().as_secs_f64();
     report.add("distance", args.distance, "");
     report.add("wavelength", field.wavelength, "");

@@ -9,7 +9,9 @@ use holodrive::units;
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Encoding")]
 pub(crate) struct EncodingArgs {
-    /// Encoding [default: double-phase; on an amplitude panel off-axis-bipolar].
+    /// Encoding [default: view; of a field double-phase].
+    ///
+    /// On an amplitude panel it is off-axis-bipolar.
     #[arg(long, alias = "method", value_parser = one_of::<Encoding>(), value_name = "NAME")]
     pub(crate) encoding: Option<Encoding>,
     /// Off-axis: angle of the reference wave, x or x,y.
@@ -21,9 +23,9 @@ pub(crate) struct EncodingArgs {
     /// z of the picture's planes [default: three over the content's depth].
     ///
     /// Negative behind the panel. For plane-gradient, gerchberg-saxton, weighted and double-constraint.
-    #[arg(long, value_parser = units::length, value_name = "LENGTH,…", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(hide_short_help = true, long, value_parser = units::length, value_name = "LENGTH,…", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) depths: Vec<f64>,
-    /// Iterations of gradient and of the methods with depths.
+    /// Iterations of view, of gradient and of the methods with depths.
     #[arg(hide_short_help = true, long, value_parser = clap::value_parser!(u64).range(1..=100_000), value_name = "N")]
     pub(crate) iterations: Option<u64>,
     /// First phases of the methods with depths.

@@ -1,11 +1,13 @@
 //! Which flags an input has a use for: those of the groups that its way to light goes through.
 
 use super::encoding::EncodingArgs;
-use super::hologram::HologramArgs;
+use super::field::FieldArgs;
+use super::hologram::{ChannelArgs, HologramArgs};
 use super::placement::{DepthMapArgs, PlacementArgs};
 use super::scene::{RandomArgs, SceneArgs};
 use super::sequence::SequenceArgs;
 use super::steps::{PictureArgs, SimulationArgs};
+use super::viewer::ViewerArgs;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Args, Command, Id};
 
@@ -21,10 +23,15 @@ pub(crate) enum Group {
     Picture,
     Simulation,
     Sequence,
+    Viewer,
+    Channel,
+    Field,
+    /// --focus and --distance, which say where a picture is sharp.
+    Focus,
 }
 
 impl Group {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 13] = [
         Self::Scene,
         Self::Random,
         Self::Placement,
@@ -34,6 +41,10 @@ impl Group {
         Self::Picture,
         Self::Simulation,
         Self::Sequence,
+        Self::Viewer,
+        Self::Channel,
+        Self::Field,
+        Self::Focus,
     ];
 
     /// The name that clap knows its struct by, and its flags as the struct declares them.
@@ -48,6 +59,10 @@ impl Group {
             Self::Picture => of::<PictureArgs>(),
             Self::Simulation => of::<SimulationArgs>(),
             Self::Sequence => of::<SequenceArgs>(),
+            Self::Viewer => of::<ViewerArgs>(),
+            Self::Channel => of::<ChannelArgs>(),
+            Self::Field => of::<FieldArgs>(),
+            Self::Focus => (None, ["focus", "distance"].map(|flag| Arg::new(flag).long(flag)).to_vec()),
         }
     }
 }
@@ -86,7 +101,7 @@ mod tests {
             let (name, typed) = typed.subcommand().expect("command");
             unused(all.find_subcommand(name).expect("command"), typed, used, input)
         };
-        let cloud = [Group::Random, Group::Hologram, Group::Encoding];
+        let cloud = [Group::Random, Group::Hologram, Group::Encoding, Group::Field];
         let line = "holodrive show p.ply --rays 9x9 --bounces 3 --error 1e-2 --seed 2 --loop --zero-order-stop 1deg";
         let told = "--rays, --bounces, --loop: of no use for a point cloud; ignored";
         assert_eq!(said(line, &cloud, "a point cloud").as_deref(), Some(told));

@@ -21,7 +21,13 @@ pub(crate) struct HologramArgs {
     /// Less means fewer or smaller tables, and a refusal where no engine fits.
     #[arg(hide_short_help = true, long, default_value = "1GB", value_parser = units::memory, value_name = "SIZE")]
     pub(crate) memory: u64,
-    /// Which light of a coloured cloud.
+}
+
+/// Which light one laser shows.
+#[derive(Clone, Copy, Debug, Args)]
+#[command(next_help_heading = "Hologram")]
+pub(crate) struct ChannelArgs {
+    /// Which light of a coloured cloud or light field.
     #[arg(hide_short_help = true, long, value_parser = one_of::<Channel>(), default_value = "luminance", value_name = "NAME", conflicts_with = "wavelengths")]
     pub(crate) channel: Channel,
 }

@@ -3,6 +3,7 @@
 mod bench;
 mod calibrate;
 mod encoding;
+mod field;
 mod groups;
 mod hologram;
 mod monitors;
@@ -15,23 +16,30 @@ mod sequence;
 mod serve;
 mod show;
 mod steps;
+mod viewer;
+mod views;
 
-pub(crate) use bench::{BenchCommand, EncodingsArgs, IterationsArgs};
+pub(crate) use bench::{BenchCommand, BenchViewsArgs, EncodingsArgs, IterationsArgs};
 pub(crate) use calibrate::{CalibrateCommand, CheckArgs, CurveArgs, FlatnessArgs, ShownArgs};
 pub(crate) use encoding::EncodingArgs;
+pub(crate) use field::FieldArgs;
 pub(crate) use groups::{Group, unused};
 pub(crate) use hologram::HologramArgs;
 pub(crate) use monitors::{DoctorArgs, MonitorsArgs};
 pub(crate) use panel::{ColorArgs, PanelArgs};
 #[cfg(feature = "display")]
 pub(crate) use parse::Ahead;
+#[cfg(feature = "display")]
+pub(crate) use parse::position;
 pub(crate) use parse::{Wavelengths, White};
-pub(crate) use placement::{PlacementArg, PlacementArgs};
+pub(crate) use placement::{DepthMapArgs, PlacementArg, PlacementArgs};
 pub(crate) use print::{ExportArgs, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs};
 pub(crate) use scene::{FileArgs, SceneArgs};
 pub(crate) use serve::{ServeArgs, ServedLevelsArg};
-pub(crate) use show::ShowArgs;
+pub(crate) use show::{DEFAULT_OUTPUT, ShowArgs};
 pub(crate) use steps::{ComputeArgs, EncodeArgs, PointsArgs, PropagateArgs, ReconstructArgs};
+pub(crate) use viewer::ViewerArgs;
+pub(crate) use views::ViewsArgs;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
@@ -63,6 +71,10 @@ pub(crate) fn command() -> clap::Command {
     let short = std::env::args_os().any(|typed| typed == "-h");
     Cli::command().mut_subcommands(|command| match command.get_name() {
         "compute" => dressed(command, short).mut_arg("engine", |engine| engine.alias("method")),
+        // What it makes for an eye needs no field.
+        "show" => ["engine", "error", "hold"]
+            .into_iter()
+            .fold(dressed(command, short), |command, flag| command.mut_arg(flag, |flag| flag.hide_short_help(true))),
         _ => dressed(command, short),
     })
 }
@@ -70,7 +82,10 @@ pub(crate) fn command() -> clap::Command {
 fn dressed(command: clap::Command, short: bool) -> clap::Command {
     let depths = ["near", "distance", "depths", "focus"];
     let deep = command.get_arguments().any(|flag| depths.contains(&flag.get_id().as_str()));
-    let command = command.mut_args(|flag| flag.hide_possible_values(short));
+    let command = command.mut_args(|flag| match flag.get_action().takes_values() {
+        true => flag.hide_possible_values(short),
+        false => flag,
+    });
     let command = match command.get_after_long_help().map(ToString::to_string) {
         Some(examples) if deep => command.after_long_help(format!("{DEPTHS}\n\n{examples}")),
         _ => command,
@@ -86,6 +101,13 @@ pub(crate) enum Command {
         after_long_help = "Examples:\n  holodrive points scenes/cornell.gltf -o points.ply\n  holodrive points room.glb -o world.ply --frame world --picture traced.npy --rays 800x600\n  holodrive points room.glb --points 100000 -o points.ply"
     )]
     Points(PointsArgs),
+    /// Make a light field: what an eye anywhere in an eye box sees of a scene, point cloud, or picture with depth.
+    ///
+    /// Pinhole views at most 0.5 mm apart over the box and the pupil. `show` and `encode --encoding view` take it.
+    #[command(
+        after_long_help = "Examples:\n  holodrive views scenes/cornell.gltf -o cornell.npz\n  holodrive views room.glb --eye-box 10mm -o room.npz\n  holodrive views points.ply -o views/"
+    )]
+    Views(ViewsArgs),
     /// Compute the field of a scene, point cloud, or picture with depth on the panel.
     #[command(
         after_long_help = "Examples:\n  holodrive compute points.ply -o field.npy\n  holodrive compute rgb.png+depth.png --panel holoeye-pluto-2.1 --wavelength 532nm -o field.npy\n  holodrive compute rgb.png+depth.png --layers 16 -o field.npy\n  holodrive compute near.png@-100mm+far.png@-150mm -o field.npy\n  holodrive compute points.ply --wavelengths 638nm,520nm,450nm -o field.npy"
@@ -98,7 +120,7 @@ pub(crate) enum Command {
     Propagate(PropagateArgs),
     /// Encode a field, or a picture at depths, as a frame of drive levels for a panel.
     #[command(
-        after_long_help = "Examples:\n  holodrive encode field.npy --encoding double-phase -o frame.png\n  holodrive encode field.npy --encoding double-phase --blaze 0.6deg --lens 300mm -o frame.png\n  holodrive encode picture.png --encoding weighted --depths -100mm -o frame.png\n  holodrive encode rgb.png+depth.png --encoding plane-gradient --depths -100mm,-120mm,-150mm -o frame.png"
+        after_long_help = "Examples:\n  holodrive encode field.npy --encoding double-phase -o frame.png\n  holodrive encode field.npy --encoding double-phase --blaze 0.6deg --lens 300mm -o frame.png\n  holodrive encode picture.png --encoding weighted --depths -100mm -o frame.png\n  holodrive encode rgb.png+depth.png --encoding plane-gradient --depths -100mm,-120mm,-150mm -o frame.png\n  holodrive encode cornell.npz --encoding view -o frame.png"
     )]
     Encode(EncodeArgs),
     /// Reconstruct what is seen of a frame or a field: on a plane, or through an eye.
@@ -110,7 +132,7 @@ pub(crate) enum Command {
     ///
     /// It begins with what the input is: scene, points, field or frame.
     #[command(
-        after_long_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show scenes/cornell.gltf --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive show frames/ --monitor HDMI-1 --fps 30 --loop\n  holodrive show walk.glb --fps 12\n  holodrive show room.glb --monitor HDMI-1 --live\n  ffmpeg -i levels.mkv -f rawvideo -pix_fmt gray - | holodrive show - --raw 1920x1080 --monitor HDMI-1 --fps 24"
+        after_long_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show scenes/cornell.gltf --eye-box 10mm,2mm --subframes 3\n  holodrive show scenes/cornell.gltf --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive show frames/ --monitor HDMI-1 --fps 30 --loop\n  holodrive show walk.glb --fps 12\n  holodrive show room.glb --monitor HDMI-1 --live\n  ffmpeg -i levels.mkv -f rawvideo -pix_fmt gray - | holodrive show - --raw 1920x1080 --monitor HDMI-1 --fps 24"
     )]
     Show(Box<ShowArgs>),
     /// Find a panel's curve and wavefront error: frames to show, and what the measured numbers say.
@@ -124,7 +146,7 @@ pub(crate) enum Command {
     },
     /// Compare what this program offers, on the simulated panel.
     #[command(
-        after_long_help = "Examples:\n  holodrive bench encodings\n  holodrive bench encodings --size 96x72 --iterations 20 --json"
+        after_long_help = "Examples:\n  holodrive bench views --scene scenes/cornell.gltf\n  holodrive bench encodings\n  holodrive bench encodings --size 96x72 --iterations 20 --json"
     )]
     Bench {
         /// What to compare.

@@ -11,13 +11,17 @@ pub(super) fn one_of<T: Named + Clone + Send + Sync>() -> impl TypedValueParser<
     PossibleValuesParser::new(names).try_map(|name| T::named(&name))
 }
 
+/// Pixels or rays of a picture at most: their light takes 12 bytes each, and often more than once.
+const MOST_PIXELS: usize = 1 << 27;
+
 /// Columns × rows.
 pub(super) fn size(text: &str) -> Result<(usize, usize), String> {
     let wrong = || format!("`{text}` is not a size such as 500x500");
     let (width, height) = text.split_once(['x', '×']).ok_or_else(wrong)?;
     let side = |t: &str| t.trim().parse::<usize>().ok().filter(|n| (1..=65_536).contains(n));
     match (side(width), side(height)) {
-        (Some(width), Some(height)) => Ok((width, height)),
+        (Some(width), Some(height)) if width * height <= MOST_PIXELS => Ok((width, height)),
+        (Some(_), Some(_)) => Err(format!("`{text}` is more than {MOST_PIXELS} in all")),
         _ => Err(format!("{}; each side 1 to 65536", wrong())),
     }
 }
@@ -28,6 +32,15 @@ pub(super) fn lengths(text: &str) -> Result<[f64; 2]> {
         Some((x, y)) => Ok([units::positive_length(x)?, units::positive_length(y)?]),
         None => units::positive_length(text).map(|length| [length; 2]),
     }
+}
+
+/// Two lengths, the lesser first.
+pub(super) fn range(text: &str) -> Result<[f64; 2], String> {
+    let wrong = || format!("`{text}` is not two lengths such as 0.5m,3m");
+    let (near, far) = text.split_once(',').ok_or_else(wrong)?;
+    let [near, far] = [units::length(near), units::length(far)].map(|length| length.map_err(|e| e.to_string()));
+    let (near, far) = (near?, far?);
+    if near >= 0.0 && near < far { Ok([near, far]) } else { Err(format!("{}, the lesser first", wrong())) }
 }
 
 /// An angle along x, or x,y.
@@ -45,7 +58,7 @@ fn three(text: &str, one: impl Fn(&str) -> Result<f64>, example: &str) -> Result
 }
 
 /// x,y,z in the hologram frame.
-pub(super) fn position(text: &str) -> Result<[f64; 3], String> {
+pub(crate) fn position(text: &str) -> Result<[f64; 3], String> {
     three(text, units::length, "x,y,z such as 0mm,0mm,600mm")
 }
 

@@ -22,6 +22,9 @@ pub(crate) struct FileArgs {
     /// Add the light that a file without any gets, from the viewer's upper left and the camera, to the file's own.
     #[arg(hide_short_help = true, long)]
     pub(crate) viewer_light: bool,
+    /// Read buffers and pictures of a scene that lie outside of its folder, too.
+    #[arg(hide_short_help = true, long)]
+    pub(crate) allow_outside: bool,
 }
 
 /// How a scene is lit and traced.

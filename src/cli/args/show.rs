@@ -1,22 +1,27 @@
 //! Flags of `show`.
 
 use super::encoding::EncodingArgs;
-use super::hologram::HologramArgs;
+use super::field::FieldArgs;
+use super::hologram::{ChannelArgs, HologramArgs};
 use super::panel::{ColorArgs, PanelArgs};
 #[cfg(feature = "display")]
 use super::parse::one_of;
 use super::placement::{DepthMapArgs, PlacementArgs};
 use super::scene::SceneArgs;
 use super::sequence::SequenceArgs;
+use super::viewer::ViewerArgs;
 use clap::Args;
 #[cfg(feature = "display")]
 use holodrive::display::{OnAbsence, Presenter};
 use holodrive::units;
 use std::path::PathBuf;
 
+/// Where pictures and data go if nothing is said.
+pub(crate) const DEFAULT_OUTPUT: &str = "holodrive-out";
+
 #[derive(Debug, Args)]
 pub(crate) struct ShowArgs {
-    /// Scene, point cloud, picture with depth, field, frame, or frames in time.
+    /// Scene, point cloud, picture with depth, light field, field, frame, or frames in time.
     ///
     /// A picture with depth is rgb.png+depth.png. Frames in time are a folder of pictures, an array (frames × rows × columns, .npy), raw video (- for standard input),
     /// or an animated scene.
@@ -24,7 +29,7 @@ pub(crate) struct ShowArgs {
     /// Further pictures of frames, played in this order.
     pub(crate) more: Vec<PathBuf>,
     /// Folder for pictures and data.
-    #[arg(short, long, default_value = "holodrive-out", value_name = "DIR")]
+    #[arg(short, long, default_value = DEFAULT_OUTPUT, value_name = "DIR")]
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
@@ -38,6 +43,8 @@ pub(crate) struct ShowArgs {
     pub(crate) map: DepthMapArgs,
     #[command(flatten)]
     pub(crate) hologram: HologramArgs,
+    #[command(flatten)]
+    pub(crate) channel: ChannelArgs,
     /// Encode so many sub-frames with phases of their own; shown faster than an eye sees, their speckle averages out.
     #[arg(
         hide_short_help = true,
@@ -52,7 +59,14 @@ pub(crate) struct ShowArgs {
     #[arg(hide_short_help = true, help_heading = "Hologram", long, requires = "subframes")]
     pub(crate) sparse: bool,
     #[command(flatten)]
+    pub(crate) field: FieldArgs,
+    #[command(flatten)]
     pub(crate) encoding: EncodingArgs,
+    #[command(flatten)]
+    pub(crate) viewer: ViewerArgs,
+    /// Also moving pictures: the focus through the depths, and the eye round its box (animated PNG).
+    #[arg(help_heading = "Viewer", hide_short_help = true, long)]
+    pub(crate) sweeps: bool,
     /// Show it fullscreen on this monitor (see `holodrive monitors`).
     ///
     /// Instead of pictures of the simulated panel.
@@ -86,6 +100,11 @@ pub(crate) struct ShowArgs {
     /// The keys stand in the operator's view. A coarse hologram comes at once, finer ones while nothing moves.
     #[arg(help_heading = "Display", long, requires = "monitor")]
     pub(crate) live: bool,
+    /// With --live and --encoding view: a file that says where the eye is, X,Y,Z such as 1mm,0mm,600mm.
+    ///
+    /// Whatever tracks the eye writes it anew; the hologram follows. The keys i j k l move the eye from there.
+    #[arg(requires = "live", hide_short_help = true, help_heading = "Display", long, value_name = "FILE")]
+    pub(crate) eye_from: Option<PathBuf>,
     /// With --live: where the operator's view is shown, never on the panel's monitor: a monitor, auto or none.
     #[arg(
         requires = "live",

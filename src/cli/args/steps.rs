@@ -1,11 +1,13 @@
 //! Flags of the steps that are given one by one.
 
 use super::encoding::EncodingArgs;
-use super::hologram::HologramArgs;
+use super::field::FieldArgs;
+use super::hologram::{ChannelArgs, HologramArgs};
 use super::panel::{ColorArgs, PanelArgs};
 use super::parse::{lengths, one_of, position, size};
 use super::placement::{DepthMapArgs, PlacementArgs};
 use super::scene::SceneArgs;
+use super::viewer::ViewerArgs;
 use clap::Args;
 use holodrive::points::ply::Frame;
 use holodrive::propagation::Kernel;
@@ -64,6 +66,8 @@ pub(crate) struct ComputeArgs {
     pub(crate) map: DepthMapArgs,
     #[command(flatten)]
     pub(crate) hologram: HologramArgs,
+    #[command(flatten)]
+    pub(crate) channel: ChannelArgs,
     /// A picture with depth in this many planes instead of points.
     ///
     /// By fast transforms and without gaps.
@@ -106,7 +110,9 @@ pub(crate) struct PropagateArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct EncodeArgs {
-    /// The field (.npy), or a picture (.png, .bmp; with its depth map: rgb.png+depth.png).
+    /// Field, phases or levels (.npy, .npz, .mat, .h5, .tif; file.mat:name names one of several), picture, or light field.
+    ///
+    /// Complex numbers are a field, floats are phases in radians, whole numbers are drive levels.
     pub(crate) input: PathBuf,
     /// The frame to write.
     #[arg(short, long, default_value = "frame.png", value_name = "FILE")]
@@ -116,7 +122,16 @@ pub(crate) struct EncodeArgs {
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
     #[command(flatten)]
+    pub(crate) field: FieldArgs,
+    #[command(flatten)]
+    pub(crate) map: DepthMapArgs,
+    #[command(flatten)]
     pub(crate) encoding: EncodingArgs,
+    #[command(flatten)]
+    pub(crate) viewer: ViewerArgs,
+    /// Several frames of a light field, shown faster than an eye sees; files get -000, -001 …
+    #[arg(help_heading = "Viewer", long, default_value_t = 1, value_name = "N")]
+    pub(crate) subframes: usize,
     /// What was typed and is of no use for this input.
     #[arg(skip)]
     pub(crate) idle: Option<String>,
@@ -197,6 +212,8 @@ pub(crate) struct ReconstructArgs {
     /// Width and height over which --views moves the eye.
     #[arg(help_heading = "View", long, value_parser = lengths, value_name = "LENGTH[,LENGTH]", requires = "views")]
     pub(crate) eye_box: Option<[f64; 2]>,
+    #[command(flatten)]
+    pub(crate) field: FieldArgs,
     #[command(flatten)]
     pub(crate) simulation: SimulationArgs,
     /// What was typed and is of no use for this input.
