@@ -69,7 +69,7 @@ fn bad_scenes_end_in_one_line() {
     let f = folder.path();
     refused(f, &["points", "missing.gltf"], "missing.gltf");
     refused(f, &["show", "missing.gltf"], "missing.gltf");
-    refused(f, &["show", "missing.xyz"], "not a kind of file");
+    refused(f, &["show", "missing.abc"], "not a kind of file");
     // A .glb whose file ends in the middle of its chunks.
     let mut glb = b"glTF\x02\x00\x00\x00\xff\x00\x00\x00\xc0\x00\x00\x00JSON{\"asset\"".to_vec();
     write(f, "cut.glb", &glb);
@@ -113,11 +113,9 @@ fn bad_clouds_fields_and_frames_end_in_one_line() {
     let f = folder.path();
     let head =
         "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
-    for (name, body, expected) in [
-        ("short.ply", "0 0 -0.2\n", "promises 2"),
-        ("nan.ply", "0 0 -0.2\nnan 0 -0.2\n", "not finite"),
-        ("inf.ply", "0 0 -0.2\n0 inf -0.2\n", "not finite"),
-    ] {
+    for (name, body, expected) in
+        [("short.ply", "0 0 -0.2\n", "promises 2"), ("nan.ply", "nan 0 -0.2\n0 inf -0.2\n", "no points")]
+    {
         write(f, name, format!("{head}{body}"));
         refused(f, &["compute", name], expected);
         refused(f, &["show", name, "-o", "."], expected);
@@ -321,9 +319,8 @@ fn a_depth_on_the_other_side_than_the_content_is_told_with_both_numbers() {
     assert_eq!(same, said(&["compute", "p.ply", "--panel", "small.toml", "--method", "direct", "-o", "other.npy"]));
     said(&["encode", "field.npy", "--panel", "small.toml", "--method", "double-phase", "-o", "frame.png"]);
     // A flag that this input has no use for is named.
-    let idle =
-        said(&["compute", "p.ply", "--panel", "small.toml", "--rays", "9x9", "--near", "-1m", "-o", "other.npy"]);
-    assert!(idle.contains("--rays, --near: of no use for a point cloud; ignored"), "{idle}");
+    let idle = said(&["compute", "p.ply", "--panel", "small.toml", "--rays", "9x9", "--time", "1", "-o", "other.npy"]);
+    assert!(idle.contains("--rays, --time: of no use for a point cloud; ignored"), "{idle}");
     refused(f, &["show", "frame.png", "--hold", "3"], "--monitor");
     for input in ["field.npy", "frame.png"] {
         assert_eq!(said(&["reconstruct", input, "--distance", "-30mm"]), "");
@@ -355,6 +352,7 @@ fn help_is_short_or_has_examples_and_what_was_meant_is_told() {
     let f = folder.path();
     for command in [
         "points",
+        "views",
         "compute",
         "propagate",
         "encode",
@@ -370,6 +368,7 @@ fn help_is_short_or_has_examples_and_what_was_meant_is_told() {
         "calibrate check",
         "bench",
         "bench encodings",
+        "bench views",
         "bench iterations",
         "serve",
         "monitors",
@@ -389,7 +388,7 @@ fn help_is_short_or_has_examples_and_what_was_meant_is_told() {
     refused(f, &["shwo"], "did you mean `show`? (see holodrive --help)");
     refused(f, &["calibrate", "nonsense"], "(see holodrive calibrate --help)");
     refused(f, &["calibrate"], "a command is needed: curve, flatness, check (see holodrive calibrate --help)");
-    refused(f, &["bench"], "encodings, iterations (see holodrive bench --help)");
+    refused(f, &["bench"], "encodings, views, iterations (see holodrive bench --help)");
     refused(f, &["show", "a.ply", "--wavelenght", "532nm"], "did you mean `--wavelength`? (see holodrive show --help)");
     refused(f, &["compute", "a.ply", "--engine", "plane"], "did you mean `planes`?");
     refused(f, &["encode", "a.npy", "--encoding", "doublephase"], "did you mean `double-phase`?");
@@ -541,13 +540,20 @@ fn every_command_of_the_readme_runs() {
         let out = holodrive(f, arguments);
         assert!(out.status.success(), "{command}: {}", String::from_utf8_lossy(&out.stderr));
     }
-    for name in ["frame-red.png", "frame-green.png", "frame-blue.png", "field-red.npy", "reconstruction-sharp.png"] {
+    for name in
+        ["frame-red.png", "frame-green.png", "frame-blue.png", "overview.png", "seen-near.png", "wanted-near.png"]
+    {
         assert!(f.join("colour").join(name).is_file(), "{name} is missing: {:?}", names(&f.join("colour")));
+    }
+    for name in ["box/frame-002.png", "box/sweep-focus.png", "box/sweep-eye.png", "seed/field.npy", "cornell.npz"] {
+        assert!(f.join(name).is_file(), "{name} is missing: {:?}", names(f));
     }
     for name in ["motion/contact.png", "motion/frames/frame-00003.png", "again/contact.png"] {
         assert!(f.join(name).is_file(), "{name} is missing");
     }
-    for name in ["traced.png", "points.ply", "field.npy", "frame.png", "report.json", "reconstruction-sharp.png"] {
+    for name in
+        ["traced.png", "points.ply", "frame.png", "report.json", "overview.png", "seen-near.png", "seen-far.png"]
+    {
         assert!(
             f.join("holodrive-out").join(name).is_file(),
             "{name} is missing: {:?}",

@@ -82,7 +82,8 @@ fn lamps_come_back_in_their_colours_at_their_places() {
     let setup = in_three_lasers(profile);
     let mut settings = Settings::default();
     (settings.scene.trace.width, settings.scene.trace.height) = (200, 200);
-    let lit = pipeline::points(&scene, &settings.scene, &setup, &progress).expect("points");
+    let lit = pipeline::scene(&scene, &settings.scene, &progress).expect("scene");
+    let lit = pipeline::points(&lit, &settings.scene, &setup, &progress).expect("points");
     let cloud = &lit.placed.cloud;
     let exposures = pipeline::exposures(&setup, &settings, None);
     assert_eq!(Exposure::gamut(&exposures, cloud).expect("lasers").outside_points, 0);
@@ -181,7 +182,8 @@ fn a_budget_gives_as_many_points_and_keeps_the_edges() {
     let light = |points: Budget, size: (u32, u32)| {
         let mut settings = SceneSettings { points: Some(points), ..SceneSettings::default() };
         (settings.trace.width, settings.trace.height) = size;
-        pipeline::points(&scene, &settings, &setup, &progress).expect("points")
+        let lit = pipeline::scene(&scene, &settings, &progress).expect("scene");
+        pipeline::points(&lit, &settings, &setup, &progress).expect("points")
     };
     // The lamps cover 0.64 of the picture.
     // On a coarse grid a column more or less of a lamp is several per cent.

@@ -248,12 +248,13 @@ fn no_files_import_each_other_in_a_circle() {
 #[test]
 fn every_entrance_walks_the_pipeline_and_light_is_simulated_in_one_place() {
     let code = |file: &str| without_tests(&fs::read_to_string(file).unwrap_or_else(|_| panic!("{file}")));
-    let steps = ["points", "exposures", "field", "frame", "light", "pictures"];
+    let steps = ["scene", "points", "light_field", "exposures", "views", "field", "frame", "light", "pictures", "seen"];
     let walks = [
         // The steps that each entrance takes; what it does not take, it calls another one of these for.
-        ("src/cli/load.rs", vec!["points"]),
+        ("src/cli/load.rs", vec!["scene", "points"]),
+        ("src/cli/eye.rs", vec!["light_field", "views", "seen"]),
         ("src/cli/holograms.rs", vec!["exposures", "field", "frame"]),
-        ("src/cli/show.rs", vec!["pictures"]),
+        ("src/cli/shown.rs", vec!["pictures"]),
         ("src/cli/reconstruct.rs", vec!["light"]),
         ("src/cli/sequence.rs", vec!["light"]),
         ("src/cli/animate.rs", vec!["light"]),
@@ -261,7 +262,11 @@ fn every_entrance_walks_the_pipeline_and_light_is_simulated_in_one_place() {
         ("src/live/worker.rs", vec!["exposures", "field", "frame"]),
         ("src/live/viewer.rs", vec!["light"]),
         ("src/comparison/mod.rs", vec!["frame", "light"]),
-        ("src/comparison/pictures.rs", vec!["points"]),
+        ("src/comparison/pictures.rs", vec!["scene", "points"]),
+        (
+            "src/comparison/views.rs",
+            vec!["scene", "points", "light_field", "exposures", "views", "field", "frame", "seen"],
+        ),
     ];
     let pipeline = code("src/pipeline.rs");
     for step in steps {

@@ -4,7 +4,7 @@
 use glam::{DVec2, DVec3};
 use holodrive::calibration::zernike;
 use holodrive::encode::{EncodeSettings, Encoding, encode};
-use holodrive::field::{Complex32, Complex64, Field, npy};
+use holodrive::field::{Complex32, Complex64, Field, npy, stored};
 use holodrive::names::Named;
 use holodrive::panel::{Curve, Faults, Frame, Origin, PanelProfile, Response, Setup, Simulation, Wavefront, simulate};
 use holodrive::pipeline::{self, Settings};
@@ -245,7 +245,7 @@ fn two_waves_of_bend_are_found_from_interferograms_and_from_coefficients() {
 
     // The profile carries its correction, and `encode` applies it once.
     let flat = Field::new(grid, WAVELENGTH, vec![Complex32::new(1.0, 0.0); grid.len()]).expect("field");
-    npy::write_field(&f.join("flat-field.npy"), &flat, &npy::Content::default(), "test").expect("write");
+    stored::write_field(&f.join("flat-field.npy"), &flat, &npy::Content::default(), "test").expect("write");
     for panel in ["flat.toml", "known.toml"] {
         let report =
             done(f, &["encode", "flat-field.npy", "--panel", panel, "--encoding", "kinoform", "-o", "frame.png"]);
@@ -506,7 +506,10 @@ fn pictures_at_depths_blazes_lenses_and_views() {
     ];
     assert_eq!(done(f, &views)["views"].as_array().expect("views").len(), 6);
     assert!(f.join("eye-0-0.png").is_file() && f.join("eye-2-1.png").is_file());
-    let shown = done(f, &["show", "p.ply", "--panel", "panel.toml", "--subframes", "3", "-o", "out"]);
+    let shown = done(
+        f,
+        &["show", "p.ply", "--panel", "panel.toml", "--encoding", "double-phase", "--subframes", "3", "-o", "out"],
+    );
     assert_eq!(shown["subframes"], 3);
     assert!(f.join("out/frame-002.png").is_file() && f.join("out/reconstruction-near.png").is_file());
 
@@ -551,6 +554,77 @@ fn pictures_at_depths_blazes_lenses_and_views() {
         (&["bench", "encodings", "--scene", "none.gltf"], "none.gltf"),
     ] {
         refused(f, arguments, word);
+    }
+}
+
+#[test]
+fn frames_for_an_eye_are_made_of_points_and_of_light_fields() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    fs::write(f.join("panel.toml"), PROFILE).expect("write");
+    // A lattice of points, dense as the eye sees it, in front of which a few stand alone.
+    let mut cloud = String::new();
+    for i in 0..60 * 44 {
+        let (x, y) = (1.8e-5 * (f64::from(i % 60) - 29.5), 1.8e-5 * (f64::from(i / 60) - 21.5));
+        cloud += &format!("{x:.7} {y:.7} {:.3}\n", if i % 60 > 40 { -0.008 } else { -0.012 });
+    }
+    let header = "ply\nformat ascii 1.0\nelement vertex 2640\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    fs::write(f.join("p.ply"), header.to_owned() + &cloud).expect("write");
+    let common = ["--panel", "panel.toml", "--iterations", "12"];
+    let eye = ["--eye", "0mm,0mm,80mm", "--pupil", "1mm"];
+    let shown = done(f, &[&["show", "p.ply", "-o", "out"][..], &common, &eye].concat());
+    assert_eq!(shown["encoding"], "view");
+    let psnr = |report: &serde_json::Value| report["seen"]["all"]["psnr"].as_f64().expect("PSNR");
+    assert!(
+        psnr(&shown) > 15.0 && shown["seen"]["judge"].as_str().is_some_and(|judge| judge.contains("f64")),
+        "{shown}"
+    );
+    for name in ["frame.png", "overview.png", "seen-near.png", "wanted-far.png", "traced.png", "report.json"] {
+        assert!(f.join("out").join(name).is_file(), "{name} is missing");
+    }
+    // Other encodings are judged alike, and lose to it.
+    let other = done(
+        f,
+        &[&["show", "p.ply", "-o", "kino", "--encoding", "kinoform", "--panel", "panel.toml"][..], &eye].concat(),
+    );
+    assert!(psnr(&other) < psnr(&shown), "{other}");
+    // The same by way of a file, as NumPy reads it, and of a folder of pictures; several frames for a box.
+    for views in ["v.npz", "views"] {
+        done(
+            f,
+            &[&["views", "p.ply", "-o", views, "--panel", "panel.toml", "--eye-box", "1mm,0.5mm"][..], &eye].concat(),
+        );
+        let made = done(
+            f,
+            &[
+                &["encode", views, "-o", "box.png", "--eye-box", "1mm,0.5mm", "--pupil", "1mm", "--subframes", "2"][..],
+                &common,
+            ]
+            .concat(),
+        );
+        assert_eq!(made["view"]["frames"], 2);
+        assert!(f.join("box-000.png").is_file() && f.join("box-001.png").is_file());
+        let shown = done(f, &[&["show", views, "-o", "again", "--pupil", "1mm"][..], &common].concat());
+        assert!(psnr(&shown) > 15.0, "{shown}");
+    }
+    fs::write(f.join("bad.npz"), b"PK\x03\x04 no light field").expect("write");
+    done(f, &["compute", "p.ply", "--panel", "panel.toml", "-o", "field.npy"]);
+    for (arguments, word) in [
+        (&["show", "field.npy", "--encoding", "view", "-o", "x"][..], "light field"),
+        (&["encode", "field.npy", "--encoding", "view", "-o", "x.png"], "views"),
+        (&["encode", "v.npz", "--encoding", "kinoform", "-o", "x.png"], "take view"),
+        (&["encode", "v.npz", "--blaze", "1deg", "--pupil", "1mm", "-o", "x.png"], "blaze"),
+        (&["encode", "v.npz", "--eye-box", "9mm", "--pupil", "1mm", "-o", "x.png"], "--eye-box"),
+        (&["encode", "bad.npz", "-o", "x.png"], "bad.npz"),
+        (&["show", "p.ply", "--eye", "0mm,0mm,-80mm", "--encoding", "view", "-o", "x"], "eye"),
+        (&["show", "p.ply", "--pupil", "all", "--eye-box", "1mm", "--encoding", "view", "-o", "x"], "eye"),
+        (&["show", "p.ply", "--pupil", "0mm", "-o", "x"], "pupil"),
+        (&["show", "p.ply", "--eye", "50mm,0mm,80mm", "--pupil", "1mm", "--encoding", "view", "-o", "x"], "--eye"),
+        (&["encode", "field.npy", "--subframes", "3", "-o", "x.png"], "subframes"),
+        (&["bench", "views", "--case", "nobody"], "known eye"),
+    ] {
+        refused(f, &[arguments, if arguments[0] == "bench" { &[] } else { &["--panel", "panel.toml"] }].concat(), word);
+        assert!(!f.join("x.png").exists(), "{arguments:?}");
     }
 }
 

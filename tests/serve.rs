@@ -281,6 +281,57 @@ fn an_answer_waits_until_the_panel_has_settled() {
     running.end();
 }
 
+#[test]
+fn half_requests_and_empty_connections_do_not_keep_a_lawful_client_from_the_panel() {
+    let server = Server::start(panel(), &settings(Duration::from_secs(5))).expect("server");
+    let (slmsuite, slmpy) = (server.slmsuite().expect("slmsuite"), server.slmpy().expect("slmpy"));
+    let running = Panel::run(server);
+    let mut lawful = TcpStream::connect(slmpy).expect("connect");
+    lawful.set_read_timeout(Some(Duration::from_secs(10))).expect("timeout");
+    let mut show = |level: u8| {
+        lawful.write_all(&(WIDTH * HEIGHT).to_le_bytes()).expect("length");
+        lawful.write_all(&vec![level; (WIDTH * HEIGHT) as usize]).expect("levels");
+        let mut answer = [0; 4];
+        lawful.read_exact(&mut answer).expect("an answer");
+        assert_eq!(&answer, b"done", "frame {level}");
+    };
+    show(0);
+    let stop = Arc::new(AtomicBool::new(false));
+    let attackers: Vec<JoinHandle<()>> = (0..10)
+        .map(|_| {
+            let stop = Arc::clone(&stop);
+            // Nearly as long as the longest request, which then never ends.
+            let half = vec![b'A'; 64 * 1024 + 2 * (WIDTH * HEIGHT) as usize * 101 / 100 * 4 - 200];
+            std::thread::spawn(move || {
+                while !stop.load(Ordering::SeqCst) {
+                    let Ok(mut stream) = TcpStream::connect(slmsuite) else { continue };
+                    let idle: Vec<_> = (0..2).map(|_| TcpStream::connect(slmsuite)).collect();
+                    let _ = stream.set_write_timeout(Some(Duration::from_millis(300)));
+                    let _ = stream.write_all(&half);
+                    for _ in 0..20 {
+                        if stop.load(Ordering::SeqCst) || stream.write_all(b"A").is_err() {
+                            break;
+                        }
+                        std::thread::sleep(Duration::from_millis(50));
+                    }
+                    drop(idle);
+                }
+            })
+        })
+        .collect();
+    std::thread::sleep(Duration::from_millis(300));
+    let start = Instant::now();
+    for level in 1..=40 {
+        show(level);
+    }
+    let took = start.elapsed();
+    stop.store(true, Ordering::SeqCst);
+    attackers.into_iter().for_each(|attacker| attacker.join().expect("no panic"));
+    let (_, shown) = running.end();
+    assert_eq!(shown.len(), 41);
+    assert!(took < Duration::from_secs(8), "{took:?}");
+}
+
 #[cfg(unix)]
 mod local {
     use super::*;

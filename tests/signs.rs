@@ -3,7 +3,7 @@
 
 use glam::{DVec2, DVec3};
 use holodrive::encode::{EncodeOptions, Encoded, Encoding, OffAxis, Reference};
-use holodrive::field::{Complex64, Fft2, Field, Grid, npy};
+use holodrive::field::{Complex64, Fft2, Field, Grid, npy, stored};
 use holodrive::hologram::{self, HologramSettings};
 use holodrive::names::Named;
 use holodrive::panel::{Frame, Illumination, Origin, PanelProfile, Setup};
@@ -100,8 +100,8 @@ fn up_is_up_and_left_is_left_from_point_to_picture_for_every_encoding_and_both_s
             let field = hologram::compute(&points, &grid, WAVELENGTH, &plan, &Progress::new()).expect("field").field;
             // Through files, as the steps on the command line hand it on.
             let path = folder.path().join("field.npy");
-            npy::write_field(&path, &field, &npy::Content::default(), "test").expect("write");
-            let (field, _) = npy::read_field(&path, None, None).expect("read");
+            stored::write_field(&path, &field, &npy::Content::default(), "test").expect("write");
+            let (field, _) = stored::read_field(&path, None, None).expect("read");
             let encoded = frame(&field, &profile, encoding.clone());
             let path = folder.path().join("frame.png");
             encoded.frame.write(&path).expect("write");
@@ -239,7 +239,8 @@ fn sharp_and_blurred(scene: &std::path::Path, corner: [usize; 2], size: usize) -
         let mut settings = SceneSettings { placement, ..Default::default() };
         (settings.trace.width, settings.trace.height) = (450, 450);
         settings.trace.mirror_depth = mirror_depth;
-        pipeline::points(scene, &settings, &setup, &Progress::new()).expect("points")
+        let lit = pipeline::scene(scene, &settings, &Progress::new()).expect("scene");
+        pipeline::points(&lit, &settings, &setup, &Progress::new()).expect("points")
     };
     let (focus, path) = (lit(MirrorDepth::Focus), lit(MirrorDepth::Path));
     let points = &focus.placed.cloud.points;

@@ -1,8 +1,9 @@
-//! A glTF scene on a simulated panel, and how like the scene its picture is.
+//! A glTF scene on a simulated panel for an eye before it, and how like the scene what it sees is.
 //!
 //! `cargo run --release --example scene_to_picture -- scenes/cornell.gltf out`
 
 use holodrive::Result;
+use holodrive::encode::{Encoding, ViewEncoding};
 use holodrive::panel::{PanelProfile, Setup};
 use holodrive::pipeline::{self, Settings};
 use holodrive::points::WhitePoint;
@@ -17,18 +18,18 @@ fn main() -> Result<()> {
     let setup = Setup::new(PanelProfile::phase(960, 540, 8e-6, 8, 632.8e-9)?, None)?;
     let mut settings = Settings::default();
     (settings.scene.trace.width, settings.scene.trace.height) = (120, 120);
-    // The lamp burns out, as in a photograph, and a stop keeps the panel's zero order out.
+    // The lamp burns out, as in a photograph.
     settings.scene.white = WhitePoint::Auto;
-    settings.bench.zero_order_stop = 0.05f64.to_radians();
+    settings.encode.encoding = Some(Encoding::View(ViewEncoding { iterations: Some(40), ..ViewEncoding::default() }));
     let out = pipeline::run(&scene, &setup, &settings, &Progress::new())?;
 
     holodrive::files::output_folder(&folder)?;
-    out.pictures.write(&folder)?;
+    out.seen.write(&folder)?;
     for (name, z) in &out.points.view.focus {
         println!("{name}: in focus at z = {:.1} mm", 1e3 * z);
     }
-    if let Some(likeness) = &out.pictures.likeness {
-        println!("PSNR {:.1} dB, SSIM {:.3}; pictures in {}", likeness.psnr, likeness.ssim, folder.display());
-    }
+    let seen = &out.seen.figures.all;
+    println!("PSNR {:.1} dB, SSIM {:.3}; pictures in {}", seen.psnr, seen.ssim, folder.display());
+    assert!(seen.psnr > 25.0, "{seen:?}");
     Ok(())
 }

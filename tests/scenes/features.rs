@@ -268,7 +268,7 @@ fn without_light_a_stated_one_stands_in() {
     let loaded = file.load().expect("loads");
     assert!(warns(&loaded, "no light"));
     let [key, fill] = loaded.scene.lights.as_slice() else { panic!("two lights stand in") };
-    assert_eq!((key.kind, fill.kind), (LightKind::Directional, LightKind::Point));
+    assert_eq!((key.kind, fill.kind), (LightKind::Directional, LightKind::Eye));
     // The key light falls on what the camera sees; the fill light's irradiance at the middle is what is stated.
     let view = loaded.scene.cameras[0].ray(0.5, 0.5, 1.0).direction.as_vec3();
     assert!(key.direction.dot(view) > 0.3 && key.direction.y < 0.0);

@@ -4,6 +4,7 @@
 
 mod animation;
 mod builder;
+mod extensions;
 mod features;
 mod fuzz;
 mod malformed;

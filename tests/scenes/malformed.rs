@@ -21,7 +21,7 @@ fn the_file_that_the_others_are_made_from_is_good() {
 fn a_missing_file_or_folder() {
     assert_refused(load(Path::new("/no/such/scene.gltf"), &LoadOptions::default()), "/no/such/scene.gltf");
     let folder = tempfile::tempdir().expect("folder");
-    assert_refused(load(folder.path(), &LoadOptions::default()), "directory");
+    assert_refused(load(folder.path(), &LoadOptions::default()), "folder");
 }
 
 #[test]
