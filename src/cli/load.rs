@@ -145,7 +145,7 @@ impl Points {
                 report_light(&scene, begin.elapsed().as_secs_f64(), report);
                 return Ok(Self::of_scene(path, lit, scene, settings.phase));
             }
-            Input::Points(path) => Self::read(path, reading, settings.phase, setup, report)?,
+            Input::Points(path) => Self::read(path, reading, settings, setup, report)?,
             Input::Images(rgb, depth) => {
                 let seed = match settings.phase {
                     Phase::Zero => None,
@@ -189,8 +189,16 @@ impl Points {
     }
 
     /// A cloud where its file says, or where it is placed.
-    fn read(path: &Path, reading: &Reading, phase: Phase, setup: &Setup, report: &mut Report) -> Result<Self> {
-        let placement = reading.placement.as_ref();
+    fn read(
+        path: &Path,
+        reading: &Reading,
+        settings: &SceneSettings,
+        setup: &Setup,
+        report: &mut Report,
+    ) -> Result<Self> {
+        let phase = settings.phase;
+        // A scene's own metres are placed as a scene is.
+        let placement = reading.placement.as_ref().or(gltf::has_only_points(path).then_some(&settings.placement));
         let read = clouds::read(path)?;
         report.warn(read.warnings.iter().map(|w| format!("{}: {w}", path.display())));
         if !read.origin.is_empty() {

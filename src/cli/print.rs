@@ -28,8 +28,9 @@ pub(super) fn scene_options(file: &FileArgs, bounces: u32, photons: u32, white: 
         Some(White::At(white)) if white > 0.0 && white.is_finite() => Some(white),
         Some(White::At(white)) => return Err(Error::out_of_range("white", white, "must be greater than zero")),
     };
-    let FileArgs { camera, animation, time, viewer_light, allow_outside } = file.clone();
-    Ok(SceneOptions { camera, animation, time, viewer_light, allow_outside, bounces, photons, white })
+    let environment = file.panorama();
+    let FileArgs { camera, animation, time, viewer_light, allow_outside, .. } = file.clone();
+    Ok(SceneOptions { camera, animation, time, viewer_light, allow_outside, environment, bounces, photons, white })
 }
 
 fn resolved(args: &PrintArgs) -> Result<PrintSettings> {

@@ -74,6 +74,7 @@ pub(super) fn scene(light: &SceneArgs, placement: &PlacementArgs, default_white:
             time: light.file.time,
             viewer_light: light.file.viewer_light,
             allow_outside: light.file.allow_outside,
+            environment: light.file.panorama(),
             ..LoadOptions::default()
         },
         illumination: IlluminationSettings {

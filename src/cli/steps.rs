@@ -27,9 +27,8 @@ pub(super) fn points(args: &PointsArgs) -> Result<Report> {
     args.picture.as_deref().map_or(Ok(()), |picture| output::check(picture, &["npy", "png"]))?;
     let setup = resolve::setup_in_color(&args.panel, &args.color, &mut report)?;
     let source = input(&args.scene)?;
-    let no_scene = || Error::input(&args.scene, "is no scene: .gltf or .glb");
-    if !matches!(source, Input::Scene(_)) {
-        return Err(no_scene());
+    if !matches!(source, Input::Scene(_) | Input::Points(_)) {
+        return Err(Error::input(&args.scene, "is no scene (.gltf, .glb, .obj, .stl) and no point cloud"));
     }
     let bar = Bar::new();
     let settings = resolve::scene(&args.light, &args.placement, White::None);
@@ -39,7 +38,22 @@ pub(super) fn points(args: &PointsArgs) -> Result<Report> {
         report_gamut(lasers, &lasers.gamut(&points.cloud), &mut report);
     }
     let (mut cloud, mut metadata) = (points.cloud, points.metadata);
-    let (_, scene) = points.scene.ok_or_else(no_scene)?;
+    let Some((_, scene)) = points.scene else {
+        for (flag, path) in [("picture", &args.picture), ("depth-map", &args.depth_map)] {
+            if let Some(path) = path {
+                let what = "a point cloud has no surfaces to trace";
+                report.warn([format!("--{flag} {}: is not written: {what}", path.display())]);
+            }
+        }
+        if args.frame == ply::Frame::World {
+            let what = "is for scenes; a cloud's points are written where they stand before the panel";
+            return Err(Error::parameter("frame", what));
+        }
+        bar.progress.check()?;
+        ply::write(&args.output, &cloud, &metadata)?;
+        report.output("points", &args.output);
+        return Ok(report);
+    };
     if args.frame == ply::Frame::World {
         metadata = ply::Metadata { frame: ply::Frame::World, eye: None, window: None, ..metadata };
         for (point, world) in cloud.points.iter_mut().zip(&scene.world) {

@@ -147,7 +147,7 @@ impl Emitters {
             }
             sum += tally.mean() * factor as f32;
         }
-        let arriving = |light: &PunctualLight| match punctual_light(optics.scene(), light, at) {
+        let arriving = |light: &PunctualLight| match punctual_light(optics.bvh.size(), light, at) {
             Some((strength, end)) if light.kind == LightKind::Eye => strength * optics.seen_from(end, point),
             Some((strength, end)) => strength * optics.transmittance(point, end),
             None => Vec3::ZERO,
@@ -248,8 +248,8 @@ impl Tally {
 }
 
 /// Irradiance over π that a punctual light would give if nothing stood in the way, and where its light comes from [m]: a
-/// point beyond the scene for a directional one. `None` where it gives none.
-pub(crate) fn punctual_light(scene: &Scene, light: &PunctualLight, at: ShadingPoint) -> Option<(Vec3, DVec3)> {
+/// point beyond the scene of that `size` [m] for a directional one. `None` where it gives none.
+pub(crate) fn punctual_light(size: f64, light: &PunctualLight, at: ShadingPoint) -> Option<(Vec3, DVec3)> {
     let ShadingPoint { position: point, normal } = at;
     let (towards, distance, strength) = match light.kind {
         LightKind::Directional => (-light.direction.as_dvec3(), f64::INFINITY, 1.0),
@@ -275,12 +275,7 @@ pub(crate) fn punctual_light(scene: &Scene, light: &PunctualLight, at: ShadingPo
     if !(cosine > 0.0 && strength > 0.0 && strength.is_finite()) {
         return None;
     }
-    let end = if distance.is_finite() {
-        light.position.as_dvec3()
-    } else {
-        let size = scene.bounds().map_or(0.0, |(low, high)| (high - low).length());
-        point + towards * (2.0 * size)
-    };
+    let end = if distance.is_finite() { light.position.as_dvec3() } else { point + towards * (2.0 * size) };
     Some((light.intensity * (strength * cosine * FRAC_1_PI) as f32, end))
 }
 

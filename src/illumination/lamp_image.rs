@@ -173,7 +173,7 @@ impl Image {
                 }
                 emitter.mean_radiance * point_to_polygon(point, normal, &self.seen_from(point)) as f32
             }
-            LampSource::Point(light) => match punctual_light(lamps.optics.scene(), light, at) {
+            LampSource::Point(light) => match punctual_light(lamps.optics.bvh.size(), light, at) {
                 Some((strength, end)) if self.lights(point, true) && self.passes(point, end - point) => strength,
                 _ => return 0.0,
             },
@@ -186,7 +186,9 @@ impl Image {
         let ShadingPoint { position: point, normal } = at;
         match &self.source {
             LampSource::Point(light) => {
-                let Some((strength, end)) = punctual_light(lamps.optics.scene(), light, at) else { return Vec3::ZERO };
+                let Some((strength, end)) = punctual_light(lamps.optics.bvh.size(), light, at) else {
+                    return Vec3::ZERO;
+                };
                 if !self.lights(point, true) || !self.passes(point, end - point) {
                     return Vec3::ZERO;
                 }

@@ -1,10 +1,12 @@
 //! Light on surfaces: what leaves each point of a scene towards an eye.
 //!
-//! Three parts, by the way that light came:
+//! Four parts, by the way that light came:
 //! - *straight from a lamp*, also through thin walls: at each point that is asked for, by exact polygonal form factors
 //!   and shadow rays (the private module `emitters`): shadows have no patch edges;
 //! - *from a lamp by way of optics*: flat mirrors show images of the lamp (`images`), all else is done by photons
 //!   (`photons`, spread by `caustics`);
+//! - *from the environment*: what is small and bright in it is a lamp like others, the rest is sampled at the vertices of the
+//!   mesh (`sky`), and seen by rays that leave the scene by way of mirrors and glass;
 //! - *from other surfaces*: radiosity on an adaptive mesh (`elements`, `radiosity`), linear over each element; where
 //!   something cuts through an element the point gathers for itself, so that nothing leaks through a wall;
 //!   Rays that gather follow mirrors and glass (`paths`).
@@ -47,6 +49,7 @@ pub(crate) mod reflection;
 mod sampling;
 mod shading;
 mod shaft;
+mod sky;
 mod surface;
 #[cfg(test)]
 pub(crate) mod test_oracle;
@@ -253,6 +256,7 @@ impl Illumination {
         let count = if mesh.vertices.is_empty() { 0 } else { settings.photons };
         let photons = photons::shoot(lamps, count, settings.seed ^ 0xf070, progress)?;
         patches.receive(&bvh, &mesh, &senders, &photons);
+        let mut sky = sky::at_vertices(&optics, &mesh, settings.seed ^ 0x5c1, progress)?;
         let caustics = Caustics::new(&bvh, &photons);
         progress.check()?;
         let most = (MOST_GATHERING_RAYS / mesh.vertices.len().max(1)) as f64;
@@ -260,6 +264,10 @@ impl Illumination {
         let surroundings = Surroundings { mesh: &mesh, senders: &senders, optics: &optics };
         let transport = Transport::cast(&surroundings, side, settings.seed ^ 0x6a7, progress)?;
         let scale = settings.form_factor.scale() as f32;
+        sky.iter_mut().zip(transport.beyond()).for_each(|(sky, beyond)| *sky = (*sky + *beyond) * scale);
+        for (direct, &sender) in patches.direct.iter_mut().zip(&senders.all) {
+            *direct += mesh.mean_over(sender, &sky);
+        }
         let source: Vec<Vec3> =
             (0..senders.all.len()).map(|s| patches.albedo[s] * patches.direct[s] + patches.emission[s]).collect();
         let bounce = |x: &[Vec3]| -> Vec<Vec3> {
@@ -270,8 +278,8 @@ impl Illumination {
             radiosity::solve(&source, bounce, |b| transport.gather(b, scale), settings.residual, 200, progress)?;
         let reflected = bounce(&irradiance);
         let leaving: Vec<Vec3> = source.iter().zip(&reflected).map(|(s, r)| *s + *r).collect();
-        let energy = patches.energy(&surroundings, &emitters, &transport, &leaving, &irradiance, settings.seed);
-        let irradiance = irradiance.iter().zip(&weak).map(|(i, w)| *i + *w).collect();
+        let energy = patches.energy(&surroundings, &emitters, &transport, &leaving, &irradiance, &sky, settings.seed);
+        let irradiance = irradiance.iter().zip(&weak).zip(&sky).map(|((i, w), s)| *i + *w + *s).collect();
         let mut light = Self {
             settings,
             emitters,
@@ -309,9 +317,11 @@ impl Illumination {
         &self.optics.bvh
     }
 
-    /// Whether nothing shines at all: neither a sampled emitter, nor a weak one, nor a punctual light.
+    /// Whether nothing shines at all: neither a sampled emitter, nor a weak one, nor a punctual light, nor an environment.
     pub fn is_dark(&self) -> bool {
-        self.emitters.is_dark() && self.leaving.iter().all(|b| b.max_element() <= 0.0)
+        self.bvh().scene().environment.is_none()
+            && self.emitters.is_dark()
+            && self.leaving.iter().all(|b| b.max_element() <= 0.0)
     }
 
     fn surroundings(&self) -> Surroundings<'_> {

@@ -103,7 +103,8 @@ impl Patches {
         }
     }
 
-    /// Where the light went, for the radiance that leaves each sender and the irradiance by way of others at vertices.
+    /// Where the light went, for the radiance that leaves each sender, the irradiance by way of others at vertices, and that of
+    /// the `sky`.
     pub(crate) fn energy(
         &self,
         around: &Surroundings,
@@ -111,6 +112,7 @@ impl Patches {
         transport: &Transport,
         leaving: &[Vec3],
         irradiance: &[Vec3],
+        sky: &[Vec3],
         seed: u64,
     ) -> Energy {
         let (mesh, bvh) = (around.mesh, &around.optics.bvh);
@@ -124,7 +126,7 @@ impl Patches {
         for (s, &sender) in around.senders.all.iter().enumerate() {
             let flux = (f64::from(self.area[s]) * PI) as f32;
             let arriving = self.direct[s] + mesh.mean_over(sender, irradiance);
-            add(0, (self.emission[s] + self.punctual[s]) * flux);
+            add(0, (self.emission[s] + self.punctual[s] + mesh.mean_over(sender, sky)) * flux);
             add(1, (Vec3::ONE - self.albedo[s]) * arriving * flux);
             let corners = mesh.elements[sender.element as usize].corners;
             let chosen = sender.corner.map_or(&corners[..], |k| &corners[k as usize..=k as usize]);
@@ -146,7 +148,7 @@ impl Patches {
                 random = Random::new(random.bits(), u64::from(cell));
                 let ray = Ray { origin: point.position + normal * bvh.offset(), direction };
                 match around.follow(ray, &mut random) {
-                    (RayEnd::Escaped, tint) => {
+                    (RayEnd::Escaped { .. }, tint) => {
                         escaped += tint;
                         black += Vec3::ONE - tint;
                     }

@@ -152,7 +152,7 @@ impl Lamp<'_> {
                     }
                     Self::Point(light) => {
                         let towards = |normal| {
-                            punctual_light(lit.optics.scene(), light, ShadingPoint { position: t.middle, normal })
+                            punctual_light(lit.optics.bvh.size(), light, ShadingPoint { position: t.middle, normal })
                         };
                         let found = towards(t.normal).or_else(|| towards(-t.normal));
                         found.map_or(0.0, |(strength, _)| f64::from(strength.element_sum()))
@@ -189,7 +189,7 @@ impl Lamp<'_> {
                 )
             }
             Self::Point(light) => {
-                let towards = |normal| punctual_light(scene, light, ShadingPoint { position: at, normal });
+                let towards = |normal| punctual_light(bvh.size(), light, ShadingPoint { position: at, normal });
                 let (strength, end) = towards(target.normal).or_else(|| towards(-target.normal))?;
                 (end, strength * (std::f64::consts::PI * target.area) as f32)
             }

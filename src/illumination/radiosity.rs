@@ -10,7 +10,7 @@
 //! (GCR, Eisenstat, Elman & Schultz 1983), each colour for itself.
 
 use super::elements::{Elements, NONE, Senders};
-use super::paths::{Continuation, Optics};
+use super::paths::{Continuation, Optics, Way};
 use super::sampling::hemisphere;
 use crate::error::Result;
 use crate::progress::Progress;
@@ -26,8 +26,13 @@ pub(crate) enum RayEnd {
     Sender(u32),
     /// On something that reflects nothing diffusely.
     Black,
-    /// Nowhere.
-    Escaped,
+    /// Nowhere, in this direction; by way of mirrors and glass, or straight.
+    Escaped {
+        /// Unit direction in which it has left.
+        direction: DVec3,
+        /// Whether it was reflected or refracted.
+        bent: bool,
+    },
 }
 
 /// The ray brings nothing, or by way of optics: what it brings then stands in the vertex' list.
@@ -45,16 +50,17 @@ impl Surroundings<'_> {
     /// Follows a ray to what sends the light that it brings, with what optics on the way leave of it; emission of sampled
     /// emitters is not part of that.
     pub(crate) fn follow(&self, ray: Ray, random: &mut Random) -> (RayEnd, Vec3) {
-        let mut ray = ray;
+        let (mut ray, mut bent) = (ray, false);
         let mut weight = Vec3::ONE;
         for _ in 0..self.optics.bounces {
             let Some(meeting) = self.optics.bvh.meet(&ray, 0.0, f64::INFINITY, Sides::Both) else {
-                return (RayEnd::Escaped, weight);
+                return (RayEnd::Escaped { direction: ray.direction, bent }, weight);
             };
             if self.optics.optical[meeting.triangle as usize] {
                 match self.optics.next(&ray, &meeting, random) {
-                    Continuation::Onward(next, tint, _) => {
+                    Continuation::Onward(next, tint, way) => {
                         ray = next;
+                        bent |= way != Way::Straight;
                         weight *= tint;
                         continue;
                     }
@@ -81,6 +87,8 @@ pub(crate) struct Transport {
     tinted: Vec<Vec<(u32, Vec3)>>,
     /// Rays of each vertex that count (those above its horizon).
     counted: Vec<f32>,
+    /// Means over each vertex' rays of what the environment sends by way of mirrors and glass.
+    beyond: Vec<Vec3>,
     /// Parts of each vertex' light that escape, and that end on black or in optics.
     losses: Vec<(Vec3, Vec3)>,
 }
@@ -92,6 +100,7 @@ struct VertexGather {
     counted: f32,
     escaped: Vec3,
     absorbed: Vec3,
+    beyond: Vec3,
 }
 
 impl Transport {
@@ -126,8 +135,11 @@ impl Transport {
                     let left = if reached == RayEnd::Black { Vec3::ZERO } else { tint };
                     found.absorbed += Vec3::ONE - left;
                     *end = match reached {
-                        RayEnd::Escaped => {
+                        RayEnd::Escaped { direction, bent } => {
                             found.escaped += tint;
+                            if bent && let Some(around) = &around.optics.scene().environment {
+                                found.beyond += tint * around.smooth(direction);
+                            }
                             BLACK
                         }
                         RayEnd::Black => BLACK,
@@ -143,8 +155,9 @@ impl Transport {
             .collect();
         progress.check()?;
         let losses = found.iter().map(|f| (f.escaped / f.counted.max(1.0), f.absorbed / f.counted.max(1.0))).collect();
+        let beyond = found.iter().map(|f| f.beyond / f.counted.max(1.0)).collect();
         let (tinted, counted) = found.into_iter().map(|f| (f.tinted, f.counted)).unzip();
-        Ok(Self { rays, ends, tinted, counted, losses })
+        Ok(Self { rays, ends, tinted, counted, beyond, losses })
     }
 
     /// Mean of the senders' radiance over each vertex' rays: its irradiance over π.
@@ -159,6 +172,11 @@ impl Transport {
                 (plain + tinted) * (scale / counted.max(1.0))
             })
             .collect()
+    }
+
+    /// Irradiance over π at the vertices that comes from the environment by way of mirrors and glass.
+    pub(crate) fn beyond(&self) -> &[Vec3] {
+        &self.beyond
     }
 
     /// Parts of a vertex' light that escape, and that end on black or in optics.

@@ -3,7 +3,7 @@
 use super::elements::NONE;
 use super::emitters::ShadowRays;
 use super::radiosity::RayEnd;
-use super::{Illumination, Surface, sampling};
+use super::{Illumination, Surface, sampling, sky};
 use crate::random::Random;
 use crate::scene::bvh::{Hit, Ray};
 use glam::{DVec3, Vec3};
@@ -84,7 +84,15 @@ impl Illumination {
             }
         };
         let images = self.images.weak(self.lamps(), surface.shading_point(self.bvh().offset()), random);
-        images + self.gather(surface, f64::from(rays.div_ceil(share)).sqrt().ceil() as usize, random)
+        let sky = match &self.bvh().scene().environment {
+            Some(around) => {
+                let side = f64::from(rays.div_ceil(share)).sqrt().ceil() as usize;
+                let at = surface.shading_point(self.bvh().offset());
+                sky::straight(around, &self.optics, at, side, random) * self.settings.form_factor.scale() as f32
+            }
+            None => Vec3::ZERO,
+        };
+        images + sky + self.gather(surface, f64::from(rays.div_ceil(share)).sqrt().ceil() as usize, random)
     }
 
     /// Indirect irradiance over π, gathered with `side`² rays from the mesh's radiosity.
@@ -98,8 +106,13 @@ impl Illumination {
         for direction in directions {
             if direction.dot(surface.facing) > 0.0 {
                 rays += 1.0;
-                if let (RayEnd::Sender(sender), weight) = around.follow(Ray { origin, direction }, random) {
-                    sum += self.leaving[sender as usize] * weight;
+                match around.follow(Ray { origin, direction }, random) {
+                    (RayEnd::Sender(sender), weight) => sum += self.leaving[sender as usize] * weight,
+                    (RayEnd::Escaped { direction, bent: true }, weight) => {
+                        let beyond = &self.bvh().scene().environment;
+                        sum += beyond.as_ref().map_or(Vec3::ZERO, |sky| sky.smooth(direction)) * weight;
+                    }
+                    _ => {}
                 }
             }
         }

@@ -24,6 +24,8 @@ const NEAREST: f64 = 0.25;
 /// and one farther than this many times the whole way, or behind the eye, at that: a few rays that pass a focus of
 /// curved glass must not stretch the depth of the whole picture.
 const FARTHEST: f64 = 4.0;
+/// How far away the environment is, over the size of the scene.
+const BEYOND: f64 = 1e4;
 
 /// Light by one way.
 #[derive(Clone, Copy, Debug)]
@@ -140,6 +142,8 @@ struct Branch {
     group: Option<u16>,
     /// Over how many looks like this the mean is taken.
     share: u32,
+    /// Whether it was reflected or refracted.
+    bent: bool,
 }
 
 impl<'a> Eye<'a> {
@@ -192,6 +196,7 @@ impl<L: DiffuseLight> Looks<'_, L> {
             wave: (self.mirror_depth == MirrorDepth::Focus).then(|| Wavefront::new(ray.direction)),
             group: None,
             share,
+            bent: false,
         });
         while let Some(branch) = open.pop() {
             self.step(branch, seen, open, &mut groups, random);
@@ -213,7 +218,10 @@ impl<L: DiffuseLight> Looks<'_, L> {
             None => bvh.nearest(&ray, 0.0, Sides::Front),
             Some(normal) => bvh.nearest_leaving(&ray, normal, Sides::Front),
         };
-        let Some(hit) = hit else { return };
+        let Some(hit) = hit else {
+            self.leave(branch, seen, groups);
+            return;
+        };
         branch.path += hit.distance;
         if branch.bounces == 0 {
             branch.first = branch.path;
@@ -272,6 +280,7 @@ impl<L: DiffuseLight> Looks<'_, L> {
                 bounces: branch.bounces + 1,
                 share: branch.share * lobe,
                 group,
+                bent: true,
                 ..own(branch.weight / lobe as f32 * part, Ray { origin: surface.position, direction })
             };
             let mut mirrored = onward(ways.reflectance, ways.mirrored, groups[0]);
@@ -280,11 +289,29 @@ impl<L: DiffuseLight> Looks<'_, L> {
             }
             push(open, mirrored, random);
             let mut through = onward(ways.transmittance, ways.through, groups[1]);
+            through.bent = branch.bent || surface.volume;
             if let Some(wave) = through.wave.as_mut().filter(|_| surface.volume) {
                 wave.refract(ray.direction, ways.half, ways.ratio, &change);
             }
             push(open, through, random);
         }
+    }
+
+    /// Shows what lies beyond the scene to a branch that leaves it by way of mirrors or glass. Straight ahead it is dark: a
+    /// hologram has no place for what is infinitely far away.
+    fn leave(&self, mut branch: Branch, seen: &mut RaySample, groups: &mut u16) {
+        let Some(around) = self.bvh.scene().environment.as_ref().filter(|_| branch.bent) else { return };
+        let radiance = branch.weight * around.radiance(branch.ray.direction);
+        let group = branch.group.unwrap_or_else(|| next(groups));
+        // Its image in a curved mirror or in glass is near; that in a flat one is put as far away as the scene is large.
+        let size = self.bvh.size();
+        branch.path += size;
+        if let Some(wave) = &mut branch.wave {
+            wave.advance(branch.ray.direction, BEYOND * size, -branch.ray.direction);
+        }
+        let depth = self.depth(&branch).min(branch.path);
+        seen.radiance += radiance;
+        seen.ends.push(PathEnd { radiance, depth, bounces: branch.bounces.min(255) as u8, group });
     }
 
     /// Where along the eye's ray light of a finished branch seems to come from [m].

@@ -3,6 +3,7 @@
 use super::plate::Plate;
 use crate::error::{Error, Result};
 use crate::files;
+use crate::scene::gltf;
 use crate::segments::{SceneOptions, is_cloud};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -64,9 +65,15 @@ impl Settings {
     pub fn new(plate: &Plate, input: &Path, options: &SceneOptions) -> Result<Self> {
         let program = concat!("holodrive ", env!("CARGO_PKG_VERSION")).to_owned();
         // Points are neither seen by a camera nor lit.
+        let around = options.environment.as_ref().map(|panorama| panorama.path.clone()).filter(|_| !is_cloud(input));
         let options = if is_cloud(input) { Value::Null } else { serde_json::to_value(options).unwrap_or_default() };
         let options = options.as_object().into_iter().flatten().map(|(key, value)| (key.clone(), value.clone()));
-        Ok(Self { program, plate: plate.clone(), inputs: inputs(input)?, options: options.collect() })
+        Ok(Self {
+            program,
+            plate: plate.clone(),
+            inputs: inputs(input, around.as_deref())?,
+            options: options.collect(),
+        })
     }
 
     /// How the scene of a plate was lit.
@@ -74,11 +81,14 @@ impl Settings {
     /// # Errors
     /// [`Error::Input`] when the file is not the one that the plate was made of.
     pub fn options_for(&self, input: &Path) -> Result<SceneOptions> {
-        if inputs(input)? != self.inputs {
+        let options = Value::Object(self.options.clone().into_iter().collect());
+        let options: SceneOptions = serde_json::from_value(options)
+            .map_err(|e| Error::input(input, format!("was lit in an unknown way: {e}")))?;
+        let around = options.environment.as_ref().map(|panorama| panorama.path.as_path());
+        if inputs(input, around)? != self.inputs {
             return Err(Error::input(input, "is not the file that the plate was made of, or has changed since"));
         }
-        let options = Value::Object(self.options.clone().into_iter().collect());
-        serde_json::from_value(options).map_err(|e| Error::input(input, format!("was lit in an unknown way: {e}")))
+        Ok(options)
     }
 
     /// The first setting in which two differ, with both values; numbers are compared as they are written.
@@ -200,11 +210,11 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// Hashes of a scene or cloud and, for a glTF, of the files that it names.
+/// Hashes of a scene or cloud and, for a glTF, of the files that it names; and of the panorama around it.
 ///
 /// # Errors
 /// [`Error::Io`] for files that cannot be read.
-fn inputs(path: &Path) -> Result<Vec<Input>> {
+fn inputs(path: &Path, around: Option<&Path>) -> Result<Vec<Input>> {
     let hash = |path: &Path| -> Result<String> {
         let mut file = File::open(path).map_err(Error::io(path))?;
         let mut digest = Sha256::new();
@@ -231,6 +241,14 @@ fn inputs(path: &Path) -> Result<Vec<Input>> {
             }
         }
     }
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) && !is_cloud(path) {
+        for beside in gltf::File::open(path)?.files().iter().skip(1).filter(|beside| beside.is_file()) {
+            found.push(Input { name: name(beside), sha256: hash(beside)? });
+        }
+    }
+    if let Some(around) = around {
+        found.push(Input { name: name(around), sha256: hash(around)? });
+    }
     Ok(found)
 }
 
@@ -244,7 +262,7 @@ mod tests {
         assert_eq!(sha256(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
         assert_eq!(sha256(b""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
         let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/mirror-ball.gltf");
-        let found = inputs(Path::new(scene)).expect("inputs");
+        let found = inputs(Path::new(scene), None).expect("inputs");
         assert_eq!(found.iter().map(|i| i.name.as_str()).collect::<Vec<_>>(), ["mirror-ball.gltf", "mirror-ball.bin"]);
     }
 }

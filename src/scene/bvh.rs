@@ -90,6 +90,8 @@ pub struct SceneBvh {
     scale: f64,
     /// Length by which rays start off the surface that they leave [m].
     offset: f64,
+    /// Diagonal of the box round the scene [m].
+    size: f64,
 }
 
 impl SceneBvh {
@@ -134,7 +136,8 @@ impl SceneBvh {
         tree.exact_node_aabbs = None;
         // A corner at distance `reach` from the world's origin is rounded by up to 6e-8 of it, and traversal adds a
         // few roundings of the same size: 4e-6 is beyond them and far below anything that is modelled.
-        Self { scene, tree, leaves, scale, offset: 4e-6 * reach }
+        let size = scene.bounds().map_or(0.0, |(low, high)| (high - low).length());
+        Self { scene, tree, leaves, scale, offset: 4e-6 * reach, size }
     }
 
     /// The scene that the tree was built from.
@@ -150,6 +153,11 @@ impl SceneBvh {
     /// How far a ray's start is to be lifted off a surface so that it does not meet it again [m].
     pub fn offset(&self) -> f64 {
         self.offset
+    }
+
+    /// Diagonal of the box round the scene [m].
+    pub fn size(&self) -> f64 {
+        self.size
     }
 
     /// First surface along a ray beyond `min` and before `max` [m], in single precision.

@@ -7,16 +7,19 @@ pub mod bvh;
 #[cfg(test)]
 mod bvh_tests;
 pub mod camera;
+pub mod environment;
 pub mod gltf;
 pub mod material;
 pub mod texture;
 
 pub use bvh::{Hit, Ray, SceneBvh, Sides};
 pub use camera::{Camera, Projection};
+pub use environment::Environment;
 pub use material::{AlphaMode, Material, TextureRef};
 pub use texture::Texture;
 
 use glam::{DVec3, Vec2, Vec3};
+use std::sync::Arc;
 
 /// One triangle in world space, with what shading needs at its corners.
 #[derive(Clone, Debug)]
@@ -104,6 +107,9 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Punctual lights.
     pub lights: Vec<PunctualLight>,
+    /// What is seen by rays that leave the scene by way of mirrors and glass, and lights it from all around; its suns stand
+    /// among the lights.
+    pub environment: Option<Arc<Environment>>,
     /// Cameras in the order of the node tree; the first one is used unless another is named.
     pub cameras: Vec<Camera>,
 }

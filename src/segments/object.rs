@@ -8,6 +8,7 @@ use crate::illumination::{Illumination, IlluminationSettings};
 use crate::points::colour::Lasers;
 use crate::points::{Channel, PointSource, clouds, ply};
 use crate::progress::Progress;
+use crate::scene::environment::Panorama;
 use crate::scene::{SceneBvh, gltf};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -37,6 +38,9 @@ pub struct SceneOptions {
     /// Whether the file's URIs may point outside of its folder.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub allow_outside: bool,
+    /// What lights the scene from all around.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub environment: Option<Panorama>,
     /// Most mirrors and glass surfaces on a path.
     pub bounces: u32,
     /// Photons for caustics.
@@ -54,6 +58,7 @@ impl Default for SceneOptions {
             time: 0.0,
             viewer_light: false,
             allow_outside: false,
+            environment: None,
             bounces,
             photons,
             white: None,
@@ -85,6 +90,7 @@ impl Object {
             time: options.time,
             viewer_light: options.viewer_light,
             allow_outside: options.allow_outside,
+            environment: options.environment.clone(),
             ..gltf::LoadOptions::default()
         };
         let loaded = gltf::load(path, &load)?;

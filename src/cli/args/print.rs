@@ -13,7 +13,7 @@ use std::path::PathBuf;
 pub(crate) struct PrintArgs {
     #[command(subcommand)]
     pub(crate) command: Option<PrintCommand>,
-    /// A scene (.gltf, .glb), seen truly from each segment of the plate, or a point cloud (.ply).
+    /// A scene (.gltf, .glb, .obj, .stl), seen truly from each segment of the plate, or a point cloud (.ply, .xyz, .csv, .pcd, .las).
     pub(crate) input: Option<PathBuf>,
     /// The plate: a TOML file, such as those of calib/ whose names begin with plate-.
     #[arg(long, value_name = "FILE")]

@@ -5,6 +5,9 @@ use clap::Args;
 use holodrive::illumination::FormFactor;
 use holodrive::points::budget::Budget;
 use holodrive::points::trace::MirrorDepth;
+use holodrive::scene::environment::Panorama;
+use holodrive::units;
+use std::path::PathBuf;
 
 /// What of a file is taken, and the light that is added to it.
 #[derive(Clone, Debug, Args)]
@@ -25,6 +28,25 @@ pub(crate) struct FileArgs {
     /// Read buffers and pictures of a scene that lie outside of its folder, too.
     #[arg(hide_short_help = true, long)]
     pub(crate) allow_outside: bool,
+    /// Panorama that lights the scene from all around, and that mirrors and glass show: .hdr, .exr or a picture.
+    ///
+    /// Twice as wide as it is high; its middle looks along +x. It stands in place of the light that a file without any gets.
+    #[arg(hide_short_help = true, long, value_name = "FILE")]
+    pub(crate) environment: Option<PathBuf>,
+    /// Turn of the panorama about the vertical, from +x towards +z.
+    #[arg(hide_short_help = true, long, default_value = "0deg", value_parser = units::angle, allow_hyphen_values = true, value_name = "ANGLE")]
+    pub(crate) environment_turn: f64,
+    /// The panorama's radiance is multiplied by this.
+    #[arg(hide_short_help = true, long, default_value_t = 1.0, value_name = "FACTOR")]
+    pub(crate) environment_strength: f32,
+}
+
+impl FileArgs {
+    /// The panorama, if there is to be one.
+    pub(crate) fn panorama(&self) -> Option<Panorama> {
+        let (strength, turn) = (self.environment_strength, self.environment_turn);
+        self.environment.clone().map(|path| Panorama { path, strength, turn })
+    }
 }
 
 /// How a scene is lit and traced.

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct PointsArgs {
-    /// A .gltf or .glb file.
+    /// A scene: .gltf, .glb, .obj, .stl.
     pub(crate) scene: PathBuf,
     /// The point cloud to write.
     #[arg(short, long, default_value = "points.ply", value_name = "FILE")]
@@ -47,7 +47,10 @@ pub(crate) struct PointsArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct ComputeArgs {
-    /// Scene, point cloud (.ply), picture with depth (rgb.png+depth.png) or focal stack.
+    /// Scene, point cloud, picture with depth (rgb.png+depth.png) or focal stack.
+    ///
+    /// Scenes: .gltf, .glb, .obj, .stl. Clouds: .ply (also of splats), .xyz, .csv, .pts, .pcd, .obj, .las. Depths: .png, .tif, .npy, .pfm, .dpt,
+    /// .exr and further arrays; `file:name` chooses a variable or channel.
     ///
     /// A focal stack is pictures, each with its depth: near.png@-100mm+far.png@-150mm.
     pub(crate) input: PathBuf,

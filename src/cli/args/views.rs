@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct ViewsArgs {
-    /// Scene, point cloud (.ply), picture with depth (rgb.png+depth.png), or light field.
+    /// Scene, point cloud, picture with depth (rgb.png+depth.png), or light field.
     pub(crate) input: PathBuf,
     /// The light field to write: .npz, or a folder of pictures.
     #[arg(short, long, default_value = "views.npz", value_name = "FILE")]

@@ -1,5 +1,7 @@
-//! Point clouds of any kind of file: PLY, tables of text, PCD, the vertices of OBJ, LAS of laser scanners.
+//! Point clouds of any kind of file: PLY, tables of text, PCD, the vertices of OBJ, LAS of laser scanners, glTF
+//! without surfaces.
 
+mod gltf;
 #[cfg(feature = "las")]
 mod las;
 mod obj;
@@ -9,6 +11,7 @@ mod table;
 use super::gather::{Gather, Role, Vertex};
 use super::ply;
 use crate::error::{Error, Result};
+use crate::scene::gltf::has_only_points;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -32,9 +35,10 @@ const ENDINGS: &[&str] = &[
     "laz",
 ];
 
-/// Whether a file is a cloud, by its ending.
+/// Whether a file is a cloud: by its ending, a glTF by what it holds.
 pub fn is_cloud(path: &Path) -> bool {
-    path.extension().is_some_and(|e| ENDINGS.iter().any(|ending| e.eq_ignore_ascii_case(ending)))
+    has_only_points(path)
+        || path.extension().is_some_and(|e| ENDINGS.iter().any(|ending| e.eq_ignore_ascii_case(ending)))
 }
 
 /// Reads a cloud, by the file's ending.
@@ -48,6 +52,7 @@ pub fn read(path: &Path) -> Result<ply::Read> {
         "xyz" | "txt" | "csv" | "pts" | "asc" => table::read(path),
         "pcd" => pcd::read(path),
         "obj" => obj::read(path),
+        "gltf" | "glb" => gltf::read(path),
         #[cfg(feature = "las")]
         "las" | "laz" => las::read(path),
         _ => Err(Error::input(path, "no kind of point cloud that is read: .ply, .xyz, .csv, .pcd, .obj, .las")),

@@ -50,6 +50,8 @@ pub(super) struct Document {
     pub(super) allow_outside: bool,
     /// Content of each buffer, at least as long as the file says.
     buffers: Vec<Vec<u8>>,
+    /// URIs of further files that it was read from, images and buffers apart.
+    pub(super) beside: Vec<String>,
 }
 
 impl Document {
@@ -58,8 +60,10 @@ impl Document {
         let bytes = resources::read_file(path, MAX_FILE_BYTES).map_err(|why| Error::input(path, why))?;
         let source = Source { scene: path, allow_outside };
         let told = converted::convert(source, &bytes, warnings).map_err(|why| Error::input(path, why))?;
+        let mut beside = Vec::new();
         let (mut root, mut chunk) = match told {
             Some(told) => {
+                beside = told.beside;
                 let root = serde_json::from_value(told.file).map_err(|why| Error::input(path, why.to_string()))?;
                 (root, Some(Cow::Owned(told.buffer)))
             }
@@ -94,7 +98,7 @@ impl Document {
             buffers.push(content);
         }
         packed::unpack(path, &mut root, &mut buffers)?;
-        Ok(Self { path: path.to_path_buf(), root, allow_outside, buffers })
+        Ok(Self { path: path.to_path_buf(), root, allow_outside, buffers, beside })
     }
 
     /// An [`Error::Input`] for this file.
@@ -168,6 +172,17 @@ pub(super) fn choose(choice: &Choice, names: &[Vec<&str>], kind: &'static str) -
 }
 
 /// Splits a .glb into its JSON text and its binary chunk; chunks of unknown kinds are passed over, as glTF says.
+/// The JSON of a file of either kind, as far as it is there.
+pub(super) fn json_part(bytes: &[u8]) -> &[u8] {
+    if !bytes.starts_with(b"glTF") {
+        return bytes;
+    }
+    let Some(length) = bytes.get(12..16).and_then(|four| four.try_into().ok()).map(u32::from_le_bytes) else {
+        return &[];
+    };
+    bytes.get(20..).and_then(|rest| rest.get(..length as usize)).unwrap_or(&[])
+}
+
 fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>)> {
     let word = |at: usize| -> Option<usize> {
         let four = bytes.get(at..at.checked_add(4)?)?;

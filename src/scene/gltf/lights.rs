@@ -79,7 +79,7 @@ fn kind(document: &Document, light: &Light, what: &str) -> Result<LightKind> {
 }
 
 /// Makes sure that the scene is lit. A file without any light gets that of [`super::load`], and so does any file on
-/// request, and one whose emission lights less than a quarter of what its camera sees ([`lit_share`], which is `known` from
+/// request, and, where no environment lights it, one whose emission lights less than a quarter of what its camera sees ([`lit_share`], which is `known` from
 /// an earlier pose, so that a film does not change its light). A file whose lights are all turned down to zero is refused: that is hardly what was meant.
 pub(super) fn ensure_light(
     document: &Document,
@@ -89,6 +89,12 @@ pub(super) fn ensure_light(
     known: &mut Option<Option<f64>>,
     warnings: &mut Vec<Warning>,
 ) -> Result<()> {
+    if let Some(around) = &scene.environment {
+        scene.lights.extend(around.suns().iter().cloned());
+        if !options.viewer_light {
+            return Ok(());
+        }
+    }
     if options.viewer_light {
         viewer_light(scene, options.framed);
         return Ok(());

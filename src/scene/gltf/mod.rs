@@ -20,7 +20,8 @@
 //! mirrored and shared meshes; triangles, strips and fans, with or without indices; sparse accessors; normals, two sets
 //! of texture coordinates, vertex colours; skins and morph targets, posed by an animation clip at a time; cameras;
 //! PNG, JPEG, WebP and KTX2 textures (plain ones, and with the feature `basisu` Basis Universal) with sampler and transform; metallic-roughness materials; the extensions
-//! [`UNDERSTOOD_EXTENSIONS`]; geometry packed by Draco and meshopt. OBJ with its MTL, and STL, are told as glTF first. Points and lines have no surface: they are left out with a warning.
+//! [`UNDERSTOOD_EXTENSIONS`]; geometry packed by Draco and meshopt. OBJ with its MTL, and STL, are told as glTF first. Points and lines have no surface: they are left out with a
+//! warning; a file of points alone is a cloud ([`read_vertices`]).
 //!
 //! # Assumptions, each with a warning
 //!
@@ -48,14 +49,17 @@ mod packed;
 mod primitives;
 mod resources;
 mod rewritten;
+mod vertices;
 
 pub use converted::is_scene;
 pub use document::UNDERSTOOD_EXTENSIONS;
 pub use images::{MAX_TEXELS, MAX_TEXTURE_SIDE};
 pub use meshes::{MAX_COORDINATE, MAX_TRIANGLES};
 pub use resources::MAX_FILE_BYTES;
+pub use vertices::{Vertices, has_only_points, read_vertices};
 
-use super::{Material, Scene, Texture, Warning};
+use super::environment::Panorama;
+use super::{Environment, Material, Scene, Texture, Warning};
 use crate::error::{Error, Result};
 use document::Document;
 use glam::DVec3;
@@ -110,6 +114,8 @@ pub struct LoadOptions {
     pub framed: Option<(DVec3, DVec3)>,
     /// Whether the file's URIs may point to files outside of its folder.
     pub allow_outside: bool,
+    /// What lights the scene from all around, in place of the light that a file without any gets.
+    pub environment: Option<Panorama>,
 }
 
 /// A scene and what had to be assumed to make it.
@@ -146,6 +152,8 @@ pub struct File {
     decoded: Option<Decoded>,
     /// What share of the view the file's own emission lights, once it was looked at.
     lit: Option<Option<f64>>,
+    /// The panorama that was read last.
+    around: Option<(Panorama, Arc<Environment>)>,
 }
 
 /// Materials for the triangles of one pose, and what there was to say about them.
@@ -174,7 +182,7 @@ impl File {
     pub fn open_with(path: &Path, options: &LoadOptions) -> Result<Self> {
         let mut warnings = Vec::new();
         let document = Document::open(path, options.allow_outside, &mut warnings)?;
-        Ok(Self { document, warnings, decoded: None, lit: None })
+        Ok(Self { document, warnings, decoded: None, lit: None, around: None })
     }
 
     /// The scene in the pose that `options` name.
@@ -206,7 +214,8 @@ impl File {
         let cameras = cameras::read(document, &nodes, options.camera.as_ref(), &triangles, framed, &mut warnings)?;
         let lights = lights::read(document, &nodes)?;
 
-        let mut scene = Scene { triangles, materials, textures, lights, cameras };
+        let environment = around(&mut self.around, options, &mut warnings)?;
+        let mut scene = Scene { triangles, materials, textures, lights, environment, cameras };
         lights::ensure_light(document, &mut scene, &decoded.used, options, &mut self.lit, &mut warnings)?;
         self.decoded = Some(decoded);
         Ok(Loaded { scene: Arc::new(scene), warnings })
@@ -226,14 +235,34 @@ impl File {
         self.document.root.nodes.iter().any(|node| node.camera.is_some())
     }
 
-    /// The files that it is read from: itself, and buffers and images beside it.
+    /// The files that it is read from: itself, and buffers, images and materials beside it.
     pub fn files(&self) -> Vec<PathBuf> {
         let root = &self.document.root;
         let buffers = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
         let images = root.images.iter().filter_map(|image| image.uri.as_deref());
-        let beside = buffers.chain(images).filter_map(|uri| resources::path_of(&self.document.path, uri).ok());
+        let further = self.document.beside.iter().map(String::as_str);
+        let beside =
+            buffers.chain(images).chain(further).filter_map(|uri| resources::path_of(&self.document.path, uri).ok());
         std::iter::once(self.document.path.clone()).chain(beside).collect()
     }
+}
+
+/// The environment that was asked for; what there is to say of it.
+fn around(
+    kept: &mut Option<(Panorama, Arc<Environment>)>,
+    options: &LoadOptions,
+    warnings: &mut Vec<Warning>,
+) -> Result<Option<Arc<Environment>>> {
+    let Some(panorama) = &options.environment else { return Ok(None) };
+    let around = match kept.take().filter(|(last, _)| last == panorama) {
+        Some((_, around)) => around,
+        None => Arc::new(Environment::read(panorama)?),
+    };
+    if around.mean().max_element() <= 0.0 {
+        warnings.push(Warning(format!("{}: is black, and lights nothing", panorama.path.display())));
+    }
+    *kept = Some((panorama.clone(), Arc::clone(&around)));
+    Ok(Some(around))
 }
 
 /// The eight corners of a box.

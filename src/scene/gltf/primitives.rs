@@ -90,6 +90,37 @@ pub(super) fn primitive_size(document: &Document, primitive: &json::mesh::Primit
     Ok(Size { triangles, vertices: vertices.saturating_mul(copies) })
 }
 
+/// Points of a primitive called `what` in errors, with their linear colours; `None` for one of another kind.
+pub(super) fn read_points(
+    document: &Document,
+    primitive: &json::mesh::Primitive,
+    what: &str,
+) -> Result<Option<Vec<(Vec3, Vec3)>>> {
+    if !matches!(primitive.mode, Checked::Valid(Mode::Points)) {
+        return Ok(None);
+    }
+    let Some(positions) = attribute(primitive, Semantic::Positions) else {
+        return Err(document.error(format!("{what} has no POSITION; it has no points")));
+    };
+    let positions: Vec<[f32; 3]> = document.vectors(positions, &format!("POSITION of {what}"))?;
+    let count = positions.len();
+    let colors = Attributes { document, primitive, what, count }.colors()?;
+    let base = match primitive.material {
+        Some(material) => {
+            let [r, g, b, _] = document.get(material, what)?.pbr_metallic_roughness.base_color_factor.0;
+            Vec3::new(r, g, b)
+        }
+        None => Vec3::ONE,
+    };
+    let point = |i: usize| (Vec3::from(positions[i]), base * colors.as_ref().map_or(Vec3::ONE, |colors| colors[i]));
+    let Some(index) = primitive.indices else { return Ok(Some((0..count).map(point).collect())) };
+    let indices = document.indices(index, &format!("indices of {what}"))?;
+    match indices.iter().find(|&&i| i as usize >= count) {
+        Some(wrong) => Err(document.error(format!("{what} has index {wrong}, and only {count} vertices"))),
+        None => Ok(Some(indices.iter().map(|&i| point(i as usize)).collect())),
+    }
+}
+
 /// Decodes a primitive called `what` in errors; `None` for points and lines.
 pub(super) fn read_primitive(
     document: &Document,

@@ -12,6 +12,8 @@ use std::path::Path;
 pub(super) struct Converted {
     pub(super) file: Value,
     pub(super) buffer: Vec<u8>,
+    /// URIs of further files that it was read from, images apart.
+    pub(super) beside: Vec<String>,
 }
 
 /// Reads meshes by the file's ending; `None` for one that is glTF itself. The error is one line without the file's path.
@@ -23,10 +25,11 @@ pub(super) fn convert(source: Source, bytes: &[u8], warnings: &mut Vec<Warning>)
     }
 }
 
-/// Whether a file is a scene by its name: glTF, STL, or an OBJ that has faces (without, it is a cloud).
+/// Whether a file is a scene: STL, or glTF and OBJ with surfaces (without, they are clouds).
 pub fn is_scene(path: &Path) -> bool {
     match ending(path).as_str() {
-        "gltf" | "glb" | "stl" => true,
+        "gltf" | "glb" => !super::has_only_points(path),
+        "stl" => true,
         "obj" => obj::has_faces(path),
         _ => false,
     }
@@ -79,7 +82,7 @@ impl Arrays {
         if let (Some(file), Value::Object(more)) = (file.as_object_mut(), more) {
             file.extend(more);
         }
-        Converted { file, buffer: self.buffer }
+        Converted { file, buffer: self.buffer, beside: Vec::new() }
     }
 }
 

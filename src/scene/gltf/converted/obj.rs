@@ -38,7 +38,7 @@ pub(super) fn convert(source: Source, bytes: &[u8], warnings: &mut Vec<Warning>)
     let text = String::from_utf8_lossy(bytes).replace("\\\r\n", " ").replace("\\\n", " ");
     let mut reader = Counted { left: text.as_bytes(), line: 0 };
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
-    let said = RefCell::new(Vec::new());
+    let (said, beside) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
     let read = tobj::load_obj_buf(&mut reader, &options, |name| {
         let found = read_uri(source, &uri(&name.to_string_lossy()), MAX_MATERIAL_BYTES);
         found.map_or_else(
@@ -46,7 +46,10 @@ pub(super) fn convert(source: Source, bytes: &[u8], warnings: &mut Vec<Warning>)
                 said.borrow_mut().push(Warning(format!("its materials are not read ({why}); its faces are grey")));
                 Err(tobj::LoadError::OpenFileFailed)
             },
-            |bytes| tobj::load_mtl_buf(&mut String::from_utf8_lossy(&bytes).as_bytes()),
+            |bytes| {
+                beside.borrow_mut().push(uri(&name.to_string_lossy()));
+                tobj::load_mtl_buf(&mut String::from_utf8_lossy(&bytes).as_bytes())
+            },
         )
     });
     let (models, materials) = read.map_err(|why| format!("line {}: {why}", reader.line))?;
@@ -90,7 +93,7 @@ pub(super) fn convert(source: Source, bytes: &[u8], warnings: &mut Vec<Warning>)
     let textures: Vec<Value> = (0..images.len()).map(|source| json!({"source": source})).collect();
     let images: Vec<Value> = images.into_iter().map(|uri| json!({"uri": uri})).collect();
     let more = json!({"materials": told, "textures": textures, "images": images});
-    Ok(arrays.file(primitives, json!({"mesh": 0}), more))
+    Ok(Converted { beside: beside.into_inner(), ..arrays.file(primitives, json!({"mesh": 0}), more) })
 }
 
 /// A material: what scatters, what glows, what lets through, and how sharply it shines.

@@ -1,0 +1,138 @@
+//! Light of a scene's environment on its surfaces.
+//!
+//! What comes straight from the smooth part of the environment is sampled at the vertices of the mesh by its brightness, with
+//! a shadow ray for each sample; its suns are lamps like others. What comes by way of mirrors and glass is found by the rays
+//! that gather light from other surfaces.
+
+use super::elements::Elements;
+use super::paths::Optics;
+use super::surface::ShadingPoint;
+use crate::error::Result;
+use crate::progress::Progress;
+use crate::random::Random;
+use crate::scene::Environment;
+use glam::Vec3;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Shadow rays of a vertex, at most and at least, and of all vertices together.
+const MOST: usize = 529;
+const LEAST: usize = 64;
+const TOGETHER: usize = 8_000_000;
+
+/// Irradiance over π that comes straight from the environment's smooth part, by `side`² rays.
+pub(super) fn straight(
+    around: &Environment,
+    optics: &Optics,
+    at: ShadingPoint,
+    side: usize,
+    random: &mut Random,
+) -> Vec3 {
+    let reach = 2.0 * optics.bvh.size();
+    let mut sum = Vec3::ZERO;
+    for cell in 0..side * side {
+        // Strata along the order of the texels, which runs row by row.
+        let which = (cell as f64 + random.uniform()) / (side * side) as f64;
+        let (direction, density) = around.drawn([which, random.uniform(), random.uniform()]);
+        let cosine = direction.dot(at.normal);
+        if cosine > 0.0 {
+            let weight = (cosine / (density * PI)) as f32;
+            let left = optics.transmittance(at.position, at.position + direction * reach);
+            sum += around.smooth(direction) * left * weight;
+        }
+    }
+    sum / (side * side) as f32
+}
+
+/// The same at all vertices of the mesh.
+pub(super) fn at_vertices(optics: &Optics, mesh: &Elements, seed: u64, progress: &Progress) -> Result<Vec<Vec3>> {
+    let Some(around) = &optics.scene().environment else { return Ok(vec![Vec3::ZERO; mesh.vertices.len()]) };
+    let rays = (TOGETHER / mesh.vertices.len().max(1)).clamp(LEAST, MOST);
+    let side = (rays as f64).sqrt() as usize;
+    progress.start("light of the environment", mesh.vertices.len() as u64);
+    let offset = optics.bvh.offset();
+    let found = mesh.vertices.par_iter().enumerate().map(|(index, vertex)| {
+        progress.advance(1);
+        if vertex.buried || progress.stopped() {
+            return Vec3::ZERO;
+        }
+        straight(around, optics, vertex.shading_point(offset), side, &mut Random::new(seed, index as u64))
+    });
+    let found = found.collect();
+    progress.check()?;
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::illumination::test_rooms::Room;
+    use crate::illumination::{Illumination, IlluminationSettings};
+    use crate::points::trace::{TraceSettings, trace};
+    use crate::progress::Progress;
+    use crate::scene::{Camera, Environment, Material, SceneBvh};
+    use glam::{DVec3, Vec3};
+    use std::sync::Arc;
+
+    fn traced(mut room: Room, around: Environment, from: DVec3, to: DVec3, side: u32) -> Vec<Vec3> {
+        room.scene.lights.extend(around.suns().iter().cloned());
+        room.scene.environment = Some(Arc::new(around));
+        let light = Illumination::new(SceneBvh::new(room.scene), IlluminationSettings::default(), &Progress::new());
+        let settings = TraceSettings { width: side, height: side, ..TraceSettings::default() };
+        let camera = Camera::looking_at(from, to, 0.3);
+        let traced = trace(&light.expect("light"), &camera, &settings, &Progress::new()).expect("trace");
+        traced.picture.iter().map(|p| Vec3::from_array(*p)).collect()
+    }
+
+    fn even(radiance: f32) -> Environment {
+        Environment::new(8, 4, vec![Vec3::new(radiance, 0.5 * radiance, 0.0); 32], 0.0).expect("environment")
+    }
+
+    fn plate(material: Material) -> Room {
+        let mut room = Room::default();
+        let material = room.material(material);
+        room.quad(DVec3::new(-1.0, 0.0, 1.0), DVec3::X * 2.0, DVec3::NEG_Z * 2.0, material);
+        room
+    }
+
+    #[test]
+    fn in_an_even_environment_a_white_surface_is_as_bright_as_it() {
+        // The furnace: radiance ρL of an open plate, L of a mirror.
+        let above = DVec3::new(0.0, 3.0, 0.1);
+        for (material, share) in [(Material::diffuse(Vec3::splat(0.8)), 0.8), (Material::mirror(Vec3::ONE), 1.0)] {
+            for seen in traced(plate(material), even(2.0), above, DVec3::ZERO, 8) {
+                let wanted = Vec3::new(2.0, 1.0, 0.0) * share;
+                assert!((seen - wanted).length() < 0.02, "{seen} {wanted}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_wall_hides_its_half_and_a_sun_throws_a_sharp_shadow() {
+        // A black wall on the left edge, endless against the plate: at its middle it hides what is left of it.
+        let mut room = plate(Material::diffuse(Vec3::ONE));
+        let black = room.material(Material { double_sided: true, ..Material::diffuse(Vec3::ZERO) });
+        room.quad(DVec3::new(-1.0, 0.0, -500.0), DVec3::Z * 1000.0, DVec3::Y * 500.0, black);
+        let seen = traced(room, even(1.0), DVec3::new(0.0, 3.0, 0.01), DVec3::ZERO, 9);
+        let foot = seen[4 * 9 + 1];
+        let open = seen[4 * 9 + 4];
+        // A half-plane at a right angle hides half at its foot; everywhere as endless walls do.
+        assert!((foot.x - 0.5).abs() < 0.03 && (open.x - 0.5).abs() < 0.03, "{foot} {open}");
+
+        let (width, height) = (256, 128);
+        let mut texels = vec![Vec3::splat(0.1); width * height];
+        // Straight up but for a little: the third row from the top at longitude 0, which is +x.
+        texels[3 * width + width / 2] = Vec3::splat(1e5);
+        let around = Environment::new(width, height, texels, 0.0).expect("environment");
+        let [sun] = around.suns() else { panic!("{:?}", around.suns()) };
+        let (towards, strength) = (-sun.direction.as_dvec3(), sun.intensity.x);
+        let mut room = plate(Material::diffuse(Vec3::ONE));
+        let black = room.material(Material { double_sided: true, ..Material::diffuse(Vec3::ZERO) });
+        room.quad(DVec3::new(0.0, 0.5, -1.0), DVec3::X, DVec3::Z * 2.0, black);
+        let seen = traced(room, around, DVec3::new(0.0, 0.4, 0.0), DVec3::new(0.0, 0.0, -1e-3), 33);
+        let lit = strength * towards.y as f32 / std::f32::consts::PI;
+        let brightness: Vec<f32> = (0..33).map(|column| seen[16 * 33 + column].x).collect();
+        // Under the sheet only what comes in from aside.
+        assert!(brightness[..10].iter().all(|b| (b / lit - 1.0).abs() < 0.1), "{lit} {brightness:?}");
+        assert!(brightness[24..].iter().all(|b| b / lit < 0.1), "{lit} {brightness:?}");
+    }
+}
