@@ -244,3 +244,68 @@ fn a_field_without_depths_is_looked_at_where_it_is_sharp_or_where_a_flag_says() 
     }
     assert!(f.join("told/reconstruction-near.png").is_file());
 }
+
+/// A glTF of one mesh whose positions stand in the file itself.
+fn gltf(path: &Path, positions: &[f32], mode: u32, material: serde_json::Value) {
+    let bytes: Vec<u8> = positions.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let data = base64::Engine::encode(&base64::prelude::BASE64_STANDARD, &bytes);
+    let told = serde_json::json!({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": mode, "material": 0}]}], "materials": [material],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": positions.len() / 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": bytes.len()}],
+        "buffers": [{"byteLength": bytes.len(), "uri": format!("data:application/octet-stream;base64,{data}")}]
+    });
+    fs::write(path, told.to_string()).expect("write");
+}
+
+#[test]
+fn a_gltf_of_points_alone_is_a_cloud() {
+    let (_folder, f) = folder();
+    // An L in metres: its long stroke left, its foot to the right.
+    let corner = [-1.0f32, -1.5, 0.0, -1.0, 0.0, 0.5, -1.0, 1.5, 0.0, 0.0, -1.5, 0.0, 1.0, -1.5, 0.0];
+    let red = serde_json::json!({"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}});
+    gltf(&f.join("l.gltf"), &corner, 0, red);
+    let (report, said) = done(&f, "points l.gltf --panel small.toml --picture l.npy -o l.ply");
+    assert!(said.contains("--picture l.npy: is not written") && !f.join("l.npy").exists(), "{said}");
+    assert!(report["read"].as_str().is_some_and(|read| read.starts_with("5 points of a glTF")), "{report}");
+    let cloud = holodrive::points::ply::read(&f.join("l.ply")).expect("cloud").cloud;
+    let [low, foot] = [0, 4].map(|i| cloud.points[i].position);
+    assert!(low.x < 0.0 && low.y < 0.0 && foot.x > 0.0 && (foot.y - low.y).abs() < 1e-9, "{low} {foot}");
+    assert!(cloud.rgb.is_some_and(|rgb| rgb.iter().all(|c| c[0] > 0.9 && c[1] == 0.0)));
+    assert_eq!(done(&f, "compute l.gltf --panel small.toml -o l-field.npy").0["points"], 5);
+    refused(&f, "points l.gltf --panel small.toml --frame world -o w.ply", &["frame", "scenes"]);
+}
+
+#[test]
+fn a_panorama_lights_a_scene_and_is_seen_in_its_mirror() {
+    let (_folder, f) = folder();
+    // Red from above, blue from below; a floor and, upright behind it, a mirror that leans up.
+    let half = |up: [u8; 3], down: [u8; 3]| {
+        image::RgbImage::from_fn(64, 32, |_, y| image::Rgb(if y < 16 { up } else { down })).save(f.join("around.png"))
+    };
+    half([255, 0, 0], [0, 0, 255]).expect("png");
+    let floor = [-1.0f32, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0, 0.0, -1.0, -1.0, 0.0, 1.0, 1.0, 0.0, -1.0, -1.0, 0.0, -1.0];
+    let matt =
+        serde_json::json!({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 1}, "doubleSided": true});
+    let chrome =
+        serde_json::json!({"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0}, "doubleSided": true});
+    gltf(&f.join("floor.gltf"), &floor, 4, matt);
+    gltf(&f.join("chrome.gltf"), &floor, 4, chrome);
+    for (scene, wanted) in [("floor", 1.0f32), ("chrome", 1.0)] {
+        let line = format!(
+            "points {scene}.gltf --environment around.png --environment-strength 0.5 --rays 40x40 --panel small.toml --picture p.npy \
+             -o p.ply"
+        );
+        let (_, said) = done(&f, &line);
+        assert!(!said.contains("no light"), "{said}");
+        let picture = holodrive::field::npy::read_real(&f.join("p.npy")).expect("picture");
+        let lit: Vec<&[f32]> = picture.values.chunks(3).filter(|p| p.iter().sum::<f32>() > 0.3).collect();
+        assert!(lit.len() > 200, "{scene}: {} of 1600 pixels are lit", lit.len());
+        // The camera that was added looks from above: a white floor and a mirror both show the sky.
+        for pixel in lit {
+            assert!((pixel[0] - 0.5 * wanted).abs() < 0.06 && pixel[2] < 0.06, "{scene}: {pixel:?}");
+        }
+    }
+    refused(&f, "points floor.gltf --environment small.toml --panel small.toml -o q.ply", &["small.toml", "panorama"]);
+}

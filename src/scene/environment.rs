@@ -78,6 +78,12 @@ impl Environment {
         Ok(environment)
     }
 
+    /// Directions of the middles of a map's texels, row by row.
+    pub fn directions(width: usize, height: usize) -> impl Iterator<Item = DVec3> {
+        let map = Map { width, height, texels: Vec::new() };
+        (0..width * height).map(move |i| map.direction(i % width, i / width))
+    }
+
     /// What is small and bright in it, as parallel light.
     pub fn suns(&self) -> &[PunctualLight] {
         &self.suns

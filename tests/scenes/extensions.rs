@@ -144,3 +144,40 @@ fn light_is_added_where_a_glowing_detail_lights_nothing_and_nowhere_else() {
     let lamp = file.load().expect("loads");
     assert!(lamp.scene.lights.is_empty(), "{:?}", lamp.warnings);
 }
+
+#[test]
+fn an_environment_of_the_file_lights_from_where_its_cube_says() {
+    let mut file = matt();
+    let face = |file: &mut Builder, rgba: [u8; 4]| {
+        let mut png = Vec::new();
+        let picture = image::RgbaImage::from_pixel(4, 4, image::Rgba(rgba));
+        picture.write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png).expect("png");
+        let view = file.view(&png);
+        file.push("images", json!({"bufferView": view, "mimeType": "image/png"}))
+    };
+    // Red to the right, green above, and blue behind, of a fourth of the alpha: four times as bright.
+    let colours = [[255, 0, 0, 255], [0, 0, 0, 255], [0, 255, 0, 255], [0, 0, 0, 255], [0, 0, 0, 255], [0, 0, 255, 64]];
+    let faces: Vec<usize> = colours.map(|colour| face(&mut file, colour)).to_vec();
+    // A quarter turn about +y takes +x to −z.
+    let turn = [0.0, std::f32::consts::FRAC_1_SQRT_2, 0.0, std::f32::consts::FRAC_1_SQRT_2];
+    file.json["extensionsUsed"] = json!(["EXT_lights_image_based"]);
+    let light = json!({"intensity": 0.5, "rotation": turn, "irradianceCoefficients": vec![[0, 0, 0]; 9],
+        "specularImageSize": 4, "specularImages": [faces]});
+    file.json["extensions"] = json!({"EXT_lights_image_based": {"lights": [light]}});
+    file.json["scenes"][0]["extensions"] = json!({"EXT_lights_image_based": {"light": 0}});
+    let loaded = file.load().expect("loads");
+    assert!(!warns(&loaded, "no light") && loaded.scene.lights.is_empty(), "{:?}", loaded.warnings);
+    let around = loaded.scene.environment.as_ref().expect("environment");
+    for (direction, wanted) in [
+        (glam::DVec3::NEG_Z, [0.5, 0.0, 0.0]),
+        (glam::DVec3::Y, [0.0, 0.5, 0.0]),
+        // What was at −z is at −x.
+        (glam::DVec3::NEG_X, [0.0, 0.0, 0.5 * 255.0 / 64.0]),
+        (glam::DVec3::Z, [0.0; 3]),
+    ] {
+        let seen = around.radiance(direction);
+        assert!((seen - glam::Vec3::from(wanted)).length() < 1e-3, "{direction}: {seen}");
+    }
+    file.json["scenes"][0]["extensions"] = json!({"EXT_lights_image_based": {"light": 7}});
+    assert!(file.load().unwrap_err().to_string().contains("not there"));
+}

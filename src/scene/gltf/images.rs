@@ -116,7 +116,7 @@ fn image_name(image: &json::Image, number: usize) -> String {
 }
 
 /// The encoded bytes. A wrong index is an error of the file; bytes that are not there are a reason for a warning.
-fn image_bytes(document: &Document, image: &json::Image) -> Result<std::result::Result<Vec<u8>, String>> {
+pub(super) fn image_bytes(document: &Document, image: &json::Image) -> Result<std::result::Result<Vec<u8>, String>> {
     Ok(match (image.buffer_view, &image.uri) {
         (Some(view), _) => Ok(document.view(view, "an image")?.to_vec()),
         (None, Some(uri)) => read_uri(document.source(), uri, MAX_FILE_BYTES),
@@ -125,7 +125,7 @@ fn image_bytes(document: &Document, image: &json::Image) -> Result<std::result::
 }
 
 /// Decodes PNG, JPEG, WebP or plain KTX2 by content, whatever the file's name or declared type says.
-fn decode_picture(bytes: &[u8]) -> std::result::Result<image::RgbaImage, String> {
+pub(super) fn decode_picture(bytes: &[u8]) -> std::result::Result<image::RgbaImage, String> {
     if bytes.starts_with(ktx2::IDENTIFIER) {
         return ktx2::decode(bytes, MAX_IMAGE_SIDE, MAX_DECODER_BYTES);
     }

@@ -37,6 +37,7 @@ mod animation;
 mod cameras;
 mod converted;
 mod document;
+mod image_light;
 mod images;
 mod instances;
 mod ktx2;
@@ -154,6 +155,8 @@ pub struct File {
     lit: Option<Option<f64>>,
     /// The panorama that was read last.
     around: Option<(Panorama, Arc<Environment>)>,
+    /// The file's own environment, once it was looked for, and the scene that names it.
+    own_around: Option<(Option<Choice>, Option<Arc<Environment>>)>,
 }
 
 /// Materials for the triangles of one pose, and what there was to say about them.
@@ -182,7 +185,7 @@ impl File {
     pub fn open_with(path: &Path, options: &LoadOptions) -> Result<Self> {
         let mut warnings = Vec::new();
         let document = Document::open(path, options.allow_outside, &mut warnings)?;
-        Ok(Self { document, warnings, decoded: None, lit: None, around: None })
+        Ok(Self { document, warnings, decoded: None, lit: None, around: None, own_around: None })
     }
 
     /// The scene in the pose that `options` name.
@@ -214,7 +217,18 @@ impl File {
         let cameras = cameras::read(document, &nodes, options.camera.as_ref(), &triangles, framed, &mut warnings)?;
         let lights = lights::read(document, &nodes)?;
 
-        let environment = around(&mut self.around, options, &mut warnings)?;
+        let environment = match around(&mut self.around, options, &mut warnings)? {
+            Some(around) => Some(around),
+            None => {
+                let known = self.own_around.take().filter(|(scene, _)| *scene == options.scene);
+                let own = || {
+                    let scene = nodes::chosen_scene(document, options.scene.as_ref())?;
+                    let own = scene.map(|scene| image_light::read(document, scene)).transpose()?.flatten();
+                    Ok((options.scene.clone(), own.map(Arc::new)))
+                };
+                self.own_around.insert(known.map_or_else(own, Ok)?).1.clone()
+            }
+        };
         let mut scene = Scene { triangles, materials, textures, lights, environment, cameras };
         lights::ensure_light(document, &mut scene, &decoded.used, options, &mut self.lit, &mut warnings)?;
         self.decoded = Some(decoded);

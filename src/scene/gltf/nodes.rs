@@ -99,7 +99,7 @@ fn depth_first(nodes: &[json::Node], tops: Vec<usize>) -> std::result::Result<Ve
     Ok(order)
 }
 
-fn chosen_scene<'a>(document: &'a Document, scene: Option<&Choice>) -> Result<Option<&'a json::Scene>> {
+pub(super) fn chosen_scene<'a>(document: &'a Document, scene: Option<&Choice>) -> Result<Option<&'a json::Scene>> {
     let root = &document.root;
     if let Some(choice) = scene {
         let names: Vec<Vec<&str>> = root.scenes.iter().map(|s| s.name.as_deref().into_iter().collect()).collect();
