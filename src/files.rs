@@ -8,6 +8,8 @@
 //! # Ok::<(), holodrive::Error>(())
 //! ```
 
+pub(crate) mod pictures;
+
 use crate::error::{Error, Result};
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};

@@ -83,6 +83,7 @@
 //! | drive level | the integer that a pixel's driver gets; a *curve* says which phase or amplitude it makes |
 //! | encoding | how a complex field becomes phases or amplitudes that a panel can show |
 //! | engine | how waves of points are summed |
+//! | environment | radiance from all around a scene ([`scene::Environment`]); a *panorama* is its file |
 //! | exposure | one pattern on the panel under one laser ([`points::Exposure`]) |
 //! | eye box | the places over which a pupil's middle may move ([`light_field::Viewer`]) |
 //! | fill factor, dead space | the share of a pixel that modulates, and the rest |

@@ -138,8 +138,7 @@ impl LightField {
 }
 
 fn open(path: &Path) -> Result<image::DynamicImage> {
-    let reader = image::ImageReader::open(path).map_err(Error::io(path))?;
-    reader.decode().map_err(|e| Error::input(path, format!("not a picture that can be read: {e}")))
+    files::pictures::open(path)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::packing::VideoFrame;
 use super::profile::PanelProfile;
 use super::signal::{Packing, SignalLayout};
 use crate::error::{Error, Result};
-use crate::files;
+use crate::files::{self, pictures};
 use crate::units::show_length;
 use std::io::Cursor;
 use std::path::Path;
@@ -232,7 +232,8 @@ fn decode(path: &Path, bytes: &[u8], profile: Option<&PanelProfile>) -> Result<(
     let open = || image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(Error::io(path));
     let (width, height) = open()?.into_dimensions().map_err(unreadable)?;
     check_size(path, [width, height], profile.or(metadata.as_ref().map(|m: &FrameMetadata| &m.panel)))?;
-    let image = open()?.decode().map_err(unreadable)?;
+    let unreadable = |why: String| Error::input(path, format!("not a readable picture: {why}"));
+    let image = pictures::decode(bytes).map_err(unreadable)?;
     let (width, height) = (image.width() as usize, image.height() as usize);
     let picture = match image {
         image::DynamicImage::ImageLuma8(gray) => {

@@ -4,6 +4,7 @@ use super::drive_curve::non_monotone;
 use super::response::Curve;
 use super::wavefront::Wavefront;
 use crate::error::{Error, Result};
+use crate::files::pictures;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
@@ -40,12 +41,8 @@ pub fn wavefront_picture(path: &Path, wavelength: Option<f64>) -> Result<Wavefro
     if format == image::ImageFormat::Tiff && named != Some(format) {
         return Err(Error::calibration(path, "is a TIFF by its content and not by its name; rename it"));
     }
-    let mut reader = image::ImageReader::with_format(std::io::Cursor::new(&bytes), format);
-    let mut limits = image::Limits::default();
-    // Four bytes for each pixel of the largest panel that is sold, and as many for the decoder.
-    limits.max_alloc = Some(LARGEST);
-    reader.limits(limits);
-    let picture = reader.decode().map_err(unreadable)?;
+    let unreadable = |why: String| Error::calibration(path, format!("not a readable picture: {why}"));
+    let picture = pictures::decode(&bytes).map_err(unreadable)?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     let gray: Vec<u8> = match picture {
         image::DynamicImage::ImageLuma8(gray) => gray.into_raw(),

@@ -6,6 +6,7 @@
 
 use crate::error::{Error, Result};
 use crate::field::arrays::{self, Values};
+use crate::files::pictures;
 use crate::names::{Name, Named};
 use crate::units::show_length;
 use std::io::Read;
@@ -248,7 +249,7 @@ fn read_raw(path: &Path) -> Result<(u32, u32, Raw)> {
             Ok((width as u32, height as u32, raw))
         }
         _ => {
-            let picture = open(path)?;
+            let picture = pictures::open(path)?;
             let (width, height) = (picture.width(), picture.height());
             let wide = picture.color().bits_per_pixel() / u16::from(picture.color().channel_count()) > 8;
             let raw = if wide {
@@ -259,12 +260,6 @@ fn read_raw(path: &Path) -> Result<(u32, u32, Raw)> {
             Ok((width, height, raw))
         }
     }
-}
-
-/// Opens a picture.
-pub(super) fn open(path: &Path) -> Result<image::DynamicImage> {
-    std::fs::File::open(path).map_err(Error::io(path))?;
-    image::open(path).map_err(|e| Error::input(path, format!("not a picture that can be read: {e}")))
 }
 
 /// The floats of a file whose length fits its sides.

@@ -1,12 +1,12 @@
 //! Points from a picture and its depth map, as renderers and depth cameras give them.
 
 pub use super::depth_map::DepthScale;
-use super::depth_map::{DepthMap, DepthReading, open};
+use super::depth_map::{DepthMap, DepthReading};
 use super::placement::Placement;
 use super::{PointCloud, PointSource, luminance};
 use crate::error::{Error, Result};
 use crate::field::Grid;
-use crate::files;
+use crate::files::{self, pictures};
 use crate::random::Random;
 use crate::scene::texture::linear_from_srgb;
 use glam::DVec3;
@@ -70,7 +70,7 @@ impl RgbDepth {
             let what = "a picture with depth has no scene to make a model of; use window";
             return Err(Error::parameter("placement", what));
         };
-        let picture = open(rgb)?.into_rgb16();
+        let picture = pictures::open(rgb)?.into_rgb16();
         let map = DepthMap::read(depth, reading)?.on(depth, picture.dimensions().into())?;
         Ok(Self { picture, map, ends: [near, far] })
     }

@@ -4,11 +4,11 @@
 //! sample of a plane looks up the picture, not the other way round.
 
 use super::colour::Lasers;
-use super::depth_map::open;
 use super::images::{Picture16, PictureWindow, RgbDepth};
 use super::{Channel, Placement};
 use crate::error::{Error, Result};
 use crate::field::Grid;
+use crate::files::pictures;
 use crate::scene::texture::linear_from_srgb;
 use rayon::prelude::*;
 use std::path::PathBuf;
@@ -87,7 +87,7 @@ impl Slices {
     pub fn of_stack(files: &[(PathBuf, f64)], placement: &Placement, panel: &Grid) -> Result<Self> {
         let mut stack: Vec<(f64, Picture16)> = Vec::new();
         for (path, z) in files {
-            let picture = open(path)?.into_rgb16();
+            let picture = pictures::open(path)?.into_rgb16();
             if let Some((_, first)) = stack.first()
                 && first.dimensions() != picture.dimensions()
             {

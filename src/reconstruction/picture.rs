@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::field::Grid;
-use crate::files;
+use crate::files::{self, pictures};
 use crate::scene::texture::srgb_from_linear;
 use glam::DVec2;
 use std::path::Path;
@@ -160,7 +160,7 @@ pub fn read_gray(path: &Path) -> Result<(usize, usize, Vec<f32>)> {
     if u64::from(width) * u64::from(height) > 1 << 28 {
         return Err(Error::input(path, format!("{width}×{height} pixels are too many")));
     }
-    let gray = open().map_err(Error::io(path))?.decode().map_err(refused)?.into_luma16();
+    let gray = pictures::open(path)?.into_luma16();
     let values = gray.into_raw().into_iter().map(|v| f32::from(v) / 65535.0).collect();
     Ok((width as usize, height as usize, values))
 }

@@ -3,8 +3,9 @@
 use super::{Array, Values};
 use crate::error::{Error, Result};
 use crate::files;
+use crate::files::pictures::tiff_directory_fits;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Seek as _};
 use std::path::Path;
 use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
@@ -18,9 +19,13 @@ use tiff::tags::Tag;
 /// [`Error::Input`] for what is no such TIFF, or promises more than 2³² values.
 pub(super) fn read(path: &Path) -> Result<Array> {
     let refused = |e: tiff::TiffError| Error::input(path, format!("not a TIFF that can be read: {e}"));
-    let file = File::open(path).map_err(Error::io(path))?;
-    let length = file.metadata().map_err(Error::io(path))?.len();
-    let mut decoder = Decoder::new(BufReader::new(file)).map_err(refused)?;
+    let mut file = BufReader::new(File::open(path).map_err(Error::io(path))?);
+    let length = file.get_ref().metadata().map_err(Error::io(path))?.len();
+    if !tiff_directory_fits(&mut file, length) {
+        return Err(Error::input(path, "not a TIFF that can be read: its directory promises more than the file holds"));
+    }
+    file.rewind().map_err(Error::io(path))?;
+    let mut decoder = Decoder::new(file).map_err(refused)?;
     let (width, height) = decoder.dimensions().map_err(refused)?;
     let ColorType::Gray(bits) = decoder.colortype().map_err(refused)? else {
         return Err(Error::input(path, "has colours; an array has one sample a pixel"));
@@ -59,7 +64,11 @@ pub(super) fn read(path: &Path) -> Result<Array> {
 /// Whether a file's first picture has one float a pixel.
 pub(super) fn is_float(path: &Path) -> bool {
     let open = || {
-        let mut decoder = Decoder::new(BufReader::new(File::open(path).ok()?)).ok()?;
+        let mut file = BufReader::new(File::open(path).ok()?);
+        let length = file.get_ref().metadata().ok()?.len();
+        let fits = tiff_directory_fits(&mut file, length);
+        file.rewind().ok()?;
+        let mut decoder = fits.then(|| Decoder::new(file).ok()).flatten()?;
         let gray = matches!(decoder.colortype().ok()?, ColorType::Gray(_));
         let format = decoder.find_tag_unsigned::<u16>(Tag::SampleFormat).ok().flatten();
         Some(gray && format == Some(3))

@@ -2,6 +2,7 @@
 
 use super::Environment;
 use crate::error::{Error, Result};
+use crate::files::pictures;
 use crate::scene::texture::linear_from_srgb;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -68,11 +69,7 @@ fn picture(path: &Path) -> Result<Texels> {
         .into_dimensions()
         .map_err(refused)?;
     check(path, size.0 as usize, size.1 as usize)?;
-    let mut reader = reader;
-    let mut limits = image::Limits::default();
-    limits.max_alloc = Some(16 * MOST);
-    reader.limits(limits);
-    let texels = reader.decode().map_err(refused)?.into_rgb32f();
+    let texels = pictures::open(path)?.into_rgb32f();
     let size = [texels.width() as usize, texels.height() as usize];
     let code = |c: f32| if linear { c } else { linear_from_srgb(c) };
     Ok((size, texels.pixels().map(|p| Vec3::from_array(p.0.map(code))).collect()))

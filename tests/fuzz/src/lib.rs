@@ -6,7 +6,7 @@
 //! `HOLODRIVE_PARSER=npy cargo fuzz run --fuzz-dir tests/fuzz --sanitizer none --features guided guided` follows coverage.
 //!
 //! What must hold for any input: no panic, no more memory than [`watch::MOST_MEMORY`], an end within
-//! [`watch::MOST_SECONDS`], and what is said of it is one line of plain text.
+//! [`watch::MOST_SECONDS`], and what is said of it is no name of a source file.
 
 pub mod archive;
 pub mod conversation;

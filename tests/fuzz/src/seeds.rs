@@ -331,14 +331,14 @@ pub fn sidecars() -> Seeds {
 
 /// Light fields as an archive and as a folder.
 pub fn light_fields() -> Seeds {
-    let eyes = EyeGrid::over(DVec3::new(0.0, 0.0, 0.6), DVec2::splat(1e-3), 1e-3)?;
+    let eyes = EyeGrid::over(DVec3::new(0.0, 0.0, 0.6), DVec2::new(1e-3, 0.0), 1e-3)?;
     let field = LightField::black(eyes, Grid::new(4, 3, 8e-6, 8e-6)?, 3)?;
     let npz = written("a.npz", |path| Ok(field.write_npz(path)?))?;
     let folder = tempfile::tempdir()?;
     let at = folder.path().join("f");
     field.write_folder(&at)?;
     let mut parts = vec![("light-field.json".to_owned(), fs::read(at.join("light-field.json"))?)];
-    for entry in fs::read_dir(&at)?.flatten().take(4) {
+    for entry in fs::read_dir(&at)?.flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
         if name.ends_with("png") {
             parts.push((name, fs::read(entry.path())?));
@@ -444,7 +444,8 @@ pub fn manifests(root: &Path) -> Seeds {
     let input = root.join("scenes/cornell.gltf");
     let settings = Settings::new(&plate, &input, &SceneOptions::default())?;
     let folder = tempfile::tempdir()?;
-    let whole = json!({"settings": settings, "amplitude": 1.0, "white": 1.0});
+    let whole =
+        json!({"settings": settings, "instruction_set": "scalar", "amplitude": 1.0, "white": 1.0, "tiles": ["00"]});
     let name = "manifest.json";
     fs::write(folder.path().join(name), whole.to_string())?;
     Manifest::read(folder.path())?;

@@ -32,6 +32,28 @@ pub(super) fn has_faces(path: &Path) -> bool {
     }
 }
 
+/// Colours of materials with three numbers each, as the reader wants them: one number stands for all three, and a colour
+/// that is no three numbers (a spectrum, say) is left out.
+fn mended(materials: &str) -> String {
+    let mut out = String::with_capacity(materials.len());
+    for line in materials.lines() {
+        let mut words = line.split_ascii_whitespace();
+        let key = words.next().unwrap_or_default();
+        if !["Ka", "Kd", "Ks", "Ke"].contains(&key) {
+            out.push_str(line);
+        } else {
+            let numbers: Vec<&str> = words.take_while(|word| word.parse::<f32>().is_ok()).take(3).collect();
+            match numbers[..] {
+                [all] => out.push_str(&[key, all, all, all].join(" ")),
+                [r, g, b] => out.push_str(&[key, r, g, b].join(" ")),
+                _ => {}
+            }
+        }
+        out.push('\n');
+    }
+    out
+}
+
 /// Reads faces with their materials.
 pub(super) fn convert(source: Source, bytes: &[u8], warnings: &mut Vec<Warning>) -> Result<Converted, String> {
     // Old exporters write names in alphabets of their own, and break long lines by a backslash.
@@ -48,7 +70,7 @@ pub(super) fn convert(source: Source, bytes: &[u8], warnings: &mut Vec<Warning>)
             },
             |bytes| {
                 beside.borrow_mut().push(uri(&name.to_string_lossy()));
-                tobj::load_mtl_buf(&mut String::from_utf8_lossy(&bytes).as_bytes())
+                tobj::load_mtl_buf(&mut mended(&String::from_utf8_lossy(&bytes)).as_bytes())
             },
         )
     });

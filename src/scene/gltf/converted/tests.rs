@@ -5,8 +5,7 @@ use std::path::Path;
 
 const OBJ: &str = "# a quad and a triangle, in a material each\nmtllib the\\materials.mtl\nv 0 0 0 1 1 1\nv 2 0 0 1 1 1\nv 2 1 0 1 1 1\nv 0 1 0 1 1 1\n\
     v 0 0 1 1 0.5 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\nusemtl red\nf 1/1/1 2/2/1 \\\n 3/3/1 4/4/1\nusemtl lamp\nf -1 1 2\n";
-const MTL: &str =
-    "newmtl red\nKd 0.5 0.1 0.2\nNs 98\nd 0.25\nmap_Kd -s 1 1 1 wood.png\nnewmtl lamp\nKd 0 0 0\nKe 3 1.5 0\n";
+const MTL: &str = "newmtl red\nKd 0.5 0.1 0.2\nNs 98\nd 0.25\nmap_Kd -s 1 1 1 wood.png\nnewmtl lamp\nKd 0\nKs spectral a.rfl\nKe 3 1.5 0\n";
 
 fn loaded(files: &[(&str, &[u8])]) -> Result<Loaded, String> {
     let folder = tempfile::tempdir().expect("folder");
