@@ -111,13 +111,28 @@ impl Environment {
         self.smooth.at(self.turned(direction, -1.0))
     }
 
+    /// How densely [`Environment::drawn`] draws a unit direction [1/sr].
+    pub fn density(&self, direction: DVec3) -> f64 {
+        let map = &self.smooth;
+        let d = self.turned(direction, -1.0);
+        let place = |part: f64, count: usize| ((part * count as f64).max(0.0) as usize).min(count - 1);
+        let column = place(d.z.atan2(d.x) / TAU + 0.5, map.width);
+        let row = place(0.5 - d.y.clamp(-1.0, 1.0).asin() / PI, map.height);
+        self.density_at(row * map.width + column)
+    }
+
+    fn density_at(&self, index: usize) -> f64 {
+        let part = self.up_to[index] - if index > 0 { self.up_to[index - 1] } else { 0.0 };
+        let total = self.up_to.last().copied().unwrap_or(1.0);
+        part / (total * self.smooth.solid_angle(index / self.smooth.width))
+    }
+
     /// A direction drawn in proportion to the brightness of the smooth part by three numbers of 0 to 1, and its density
     /// [1/sr].
     pub fn drawn(&self, [which, u, v]: [f64; 3]) -> (DVec3, f64) {
         let map = &self.smooth;
         let total = self.up_to.last().copied().unwrap_or(0.0);
         let index = self.up_to.partition_point(|sum| *sum <= which * total).min(self.up_to.len() - 1);
-        let part = self.up_to[index] - if index > 0 { self.up_to[index - 1] } else { 0.0 };
         let (column, row) = (index % map.width, index / map.width);
         let longitude = ((column as f64 + u) / map.width as f64 - 0.5) * TAU;
         // Even in solid angle: in the sine of latitude.
@@ -125,7 +140,7 @@ impl Environment {
         let height = bottom + (top - bottom) * v;
         let across = (1.0 - height * height).max(0.0).sqrt();
         let local = DVec3::new(across * longitude.cos(), height, across * longitude.sin());
-        (self.turned(local, 1.0), part / (total * map.solid_angle(row)))
+        (self.turned(local, 1.0), self.density_at(index))
     }
 
     /// Turned about +y as the panorama is (`sense` 1), or back (−1).
@@ -235,14 +250,17 @@ mod tests {
         let mut random = Random::new(5, 0);
         // ∫ f L / p over drawn directions is ∫ f L: here of f = max(y, 0), irradiance of a surface that looks up.
         let n = 40_000;
-        let mut sums = [Vec3::ZERO, Vec3::ZERO];
+        let (mut sums, mut near) = ([Vec3::ZERO, Vec3::ZERO], 0);
         for _ in 0..n {
             let (d, density) = around.drawn([random.uniform(), random.uniform(), random.uniform()]);
             assert!((d.length() - 1.0).abs() < 1e-9 && density > 0.0);
+            // But for the rounding of a direction on an edge of two texels.
+            near += usize::from((around.density(d) / density - 1.0).abs() < 1e-6);
             let light = around.smooth(d) * (d.y.max(0.0) / density) as f32;
             sums[0] += light / n as f32;
             sums[1] += Vec3::splat((1.0 / density) as f32 / n as f32);
         }
+        assert!(near >= n - 4, "{near} of {n}");
         // Of 2 + y: 2π + 2π/3.
         assert!((f64::from(sums[0].x) / (2.0 * PI + TAU / 3.0) - 1.0).abs() < 0.02, "{}", sums[0]);
         assert!((f64::from(sums[0].z) / PI - 1.0).abs() < 0.02, "{}", sums[0]);
