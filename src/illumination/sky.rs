@@ -77,25 +77,26 @@ pub(super) fn at_vertices(optics: &Optics, mesh: &Elements, seed: u64, progress:
 #[cfg(test)]
 mod tests {
     use crate::illumination::test_rooms::Room;
-    use crate::illumination::{Illumination, IlluminationSettings};
-    use crate::points::trace::{TraceSettings, trace};
+    use crate::illumination::{Illumination, IlluminationSettings, Surface};
     use crate::progress::Progress;
-    use crate::scene::{Camera, Environment, Material, SceneBvh};
+    use crate::random::Random;
+    use crate::scene::{Environment, Material, Ray, SceneBvh, Sides};
     use glam::{DVec3, Vec3};
     use std::sync::Arc;
 
-    /// Columns and rows of the pictures.
-    const SIDE: usize = 21;
-
-    fn traced(mut room: Room, around: Environment, from: DVec3, to: DVec3, angle: f64) -> Vec<Vec3> {
-        let side = SIDE as u32;
+    /// Radiance of the floor of a room at places along x, seen from just above.
+    fn floor(mut room: Room, around: Environment, places: &[f64]) -> Vec<Vec3> {
         room.scene.lights.extend(around.suns().iter().cloned());
         room.scene.environment = Some(Arc::new(around));
-        let light = Illumination::new(SceneBvh::new(room.scene), IlluminationSettings::default(), &Progress::new());
-        let settings = TraceSettings { width: side, height: side, ..TraceSettings::default() };
-        let camera = Camera::looking_at(from, to, angle);
-        let traced = trace(&light.expect("light"), &camera, &settings, &Progress::new()).expect("trace");
-        traced.picture.iter().map(|p| Vec3::from_array(*p)).collect()
+        let bvh = SceneBvh::new(room.scene);
+        let light = Illumination::new(bvh, IlluminationSettings::default(), &Progress::new()).expect("light");
+        let seen = |x: &f64| {
+            let ray = Ray { origin: DVec3::new(*x, 0.1, 0.03), direction: DVec3::NEG_Y };
+            let hit = light.bvh().nearest(&ray, 0.0, Sides::Front).expect("floor");
+            let surface = Surface::at(light.bvh().scene(), &hit, 0.0);
+            light.radiance(&hit, &surface, 1, &mut Random::new(7, 0))
+        };
+        places.iter().map(seen).collect()
     }
 
     fn even(radiance: f32) -> Environment {
@@ -110,31 +111,30 @@ mod tests {
     }
 
     #[test]
-    fn in_an_even_environment_a_white_surface_is_as_bright_as_it() {
-        // The furnace: radiance ρL of an open plate, L of a mirror.
-        let above = DVec3::new(0.0, 3.0, 0.1);
-        for (material, share) in [(Material::diffuse(Vec3::splat(0.8)), 0.8), (Material::mirror(Vec3::ONE), 1.0)] {
-            for seen in traced(plate(material), even(2.0), above, DVec3::ZERO, 0.3) {
-                let wanted = Vec3::new(2.0, 1.0, 0.0) * share;
-                assert!((seen - wanted).length() < 0.02, "{seen} {wanted}");
-            }
+    fn in_an_even_environment_a_surface_is_as_bright_as_its_share_of_it() {
+        // The furnace: radiance ρL of an open plate.
+        let places: Vec<f64> = (-9..10).map(|i| 0.1 * f64::from(i)).collect();
+        for seen in floor(plate(Material::diffuse(Vec3::splat(0.8))), even(2.0), &places) {
+            assert!((seen / 0.8 - Vec3::new(2.0, 1.0, 0.0)).length() < 0.02, "{seen}");
         }
     }
 
     #[test]
-    fn a_wall_hides_its_half_and_a_sun_throws_a_sharp_shadow() {
-        // A black wall on the left edge, endless against the plate: at its middle it hides what is left of it.
+    fn a_wall_hides_its_half() {
+        // A black wall on the left edge, as good as endless: it hides what is left of it, half of all by the cosine law.
         let mut room = plate(Material::diffuse(Vec3::ONE));
         let black = room.material(Material { double_sided: true, ..Material::diffuse(Vec3::ZERO) });
         room.quad(DVec3::new(-1.0, 0.0, -500.0), DVec3::Z * 1000.0, DVec3::Y * 500.0, black);
-        let seen = traced(room, even(1.0), DVec3::new(0.0, 3.0, 0.01), DVec3::ZERO, 0.6);
-        let [foot, open] = [2, SIDE / 2].map(|column| seen[SIDE / 2 * SIDE + column]);
-        // A half-plane at a right angle hides half at its foot; everywhere as endless walls do.
-        assert!((foot.x - 0.5).abs() < 0.03 && (open.x - 0.5).abs() < 0.03, "{foot} {open}");
+        for seen in floor(room, even(1.0), &[-0.8, -0.3, 0.0, 0.7]) {
+            assert!((seen.x - 0.5).abs() < 0.02, "{seen}");
+        }
+    }
 
+    #[test]
+    fn a_sun_throws_a_sharp_shadow() {
         let (width, height) = (256, 128);
         let mut texels = vec![Vec3::splat(0.1); width * height];
-        // Straight up but for a little: the third row from the top at longitude 0, which is +x.
+        // Up but for 5°: the fourth row from the top at longitude 0, which is +x.
         texels[3 * width + width / 2] = Vec3::splat(1e5);
         let around = Environment::new(width, height, texels, 0.0).expect("environment");
         let [sun] = around.suns() else { panic!("{:?}", around.suns()) };
@@ -142,12 +142,11 @@ mod tests {
         let mut room = plate(Material::diffuse(Vec3::ONE));
         let black = room.material(Material { double_sided: true, ..Material::diffuse(Vec3::ZERO) });
         room.quad(DVec3::new(0.0, 0.5, -1.0), DVec3::X, DVec3::Z * 2.0, black);
-        let seen = traced(room, around, DVec3::new(0.0, 0.4, 0.2), DVec3::ZERO, 1.0);
+        let edge = -0.5 * towards.x / towards.y;
+        let seen = floor(room, around, &[-0.8, -0.2, edge - 1e-3, edge + 1e-3, 0.2, 0.8]);
         let lit = strength * towards.y as f32 / std::f32::consts::PI;
-        let brightness: Vec<f32> = (0..SIDE).map(|column| seen[SIDE / 2 * SIDE + column].x).collect();
-        // The shadow's edge is 4 cm to the left of the sheet's, 17 % of the half picture. Under the sheet only what comes in
-        // from aside.
-        assert!(brightness[..8].iter().all(|b| (b / lit - 1.0).abs() < 0.1), "{lit} {brightness:?}");
-        assert!(brightness[SIDE / 2 + 1..].iter().all(|b| b / lit < 0.1), "{lit} {brightness:?}");
+        // Beside the sun there is the sky, a tenth of it; under the sheet only what comes in from aside.
+        assert!(seen[..3].iter().all(|s| (s.x / lit - 1.0).abs() < 0.1), "{lit} {seen:?}");
+        assert!(seen[3..].iter().all(|s| s.x / lit < 0.1), "{lit} {seen:?}");
     }
 }

@@ -4,7 +4,7 @@
 //! counts. Its mean is the radiance that [`super::Illumination`] approximates; its noise falls with the root of the number
 //! of paths. For tests and comparisons.
 
-use super::paths::{Continuation, Optics};
+use super::paths::{Continuation, Optics, Way};
 use super::sampling::hemisphere;
 use super::surface::Surface;
 use crate::random::Random;
@@ -31,8 +31,15 @@ impl Oracle {
     /// Radiance that one path finds along an eye's ray [W/(m² sr)]: its mean over many is the truth.
     pub(crate) fn radiance(&self, ray: Ray, random: &mut Random) -> Vec3 {
         let (mut ray, mut weight, mut sum, mut sides) = (ray, Vec3::ONE, Vec3::ZERO, Sides::Front);
+        let mut bent = false;
         for surface_number in 0..MOST {
-            let Some(meeting) = self.optics.bvh.meet(&ray, 0.0, f64::INFINITY, sides) else { break };
+            let Some(meeting) = self.optics.bvh.meet(&ray, 0.0, f64::INFINITY, sides) else {
+                // Straight ahead it is dark.
+                if let Some(around) = self.optics.scene().environment.as_ref().filter(|_| bent) {
+                    sum += weight * around.radiance(ray.direction);
+                }
+                break;
+            };
             sides = Sides::Both;
             let hit = self.optics.bvh.refined(&ray, &meeting);
             let surface = Surface::at(self.optics.scene(), &hit, 0.0);
@@ -47,11 +54,13 @@ impl Oracle {
             };
             match way {
                 Continuation::Absorbed => break,
-                Continuation::Onward(next, tint, _) => {
+                Continuation::Onward(next, tint, way) => {
+                    bent |= way != Way::Straight;
                     ray = next;
                     weight *= tint;
                 }
                 Continuation::Diffuse(part) => {
+                    bent = true;
                     weight *= part * surface.albedo;
                     let direction = hemisphere(surface.normal, 1, random).next().unwrap_or(surface.normal);
                     *random = Random::new(random.bits(), u64::from(surface_number));

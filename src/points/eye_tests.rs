@@ -7,9 +7,10 @@ use crate::illumination::test_rooms::{Room, glass};
 use crate::illumination::{Illumination, IlluminationSettings};
 use crate::progress::Progress;
 use crate::random::Random;
-use crate::scene::{Camera, Material, Scene, SceneBvh};
+use crate::scene::{Camera, Environment, Material, Scene, SceneBvh};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Means over squares of pixels by this crate and by plain paths, at a few places of a picture.
 pub(crate) fn agrees(room: &Room, camera: &Camera, squares: &[[f64; 2]], paths: u32, tolerance: f64) {
@@ -104,6 +105,51 @@ fn a_mirror_ball_a_glass_ball_and_a_block_agree_with_plain_paths() {
         [0.5, 0.3],
     ];
     agrees(&room, &camera, &squares, 400_000, 1e-2);
+}
+
+/// Bright above, dimmer below, coloured from side to side.
+fn sky() -> Environment {
+    let texel = |d: DVec3| Vec3::new(1.0 + 0.8 * d.y as f32, 1.0 + 0.5 * d.x as f32, 1.2 - 0.5 * d.z as f32);
+    Environment::new(64, 32, Environment::directions(64, 32).map(texel).collect(), 0.0).unwrap()
+}
+
+#[test]
+fn in_an_environment_matte_chrome_glass_and_gloss_agree_with_plain_paths() {
+    let mut room = Room::default();
+    let matte = room.material(Material::diffuse(Vec3::new(0.7, 0.6, 0.5)));
+    let silver = room.material(Material::mirror(Vec3::splat(0.9)));
+    let glass = room.material(glass());
+    let rough = room.material(Material { roughness: 0.3, ..Material::mirror(Vec3::splat(0.8)) });
+    room.quad(DVec3::new(-0.5, -0.5, 0.5), DVec3::X, DVec3::NEG_Z, matte);
+    room.quad(DVec3::new(-0.5, -0.5, -0.5), DVec3::X, DVec3::Y * 0.6, matte);
+    room.sphere(DVec3::new(-0.25, -0.3, -0.2), 0.15, false, 32, silver);
+    room.sphere(DVec3::new(0.25, -0.3, -0.1), 0.15, false, 32, glass);
+    room.cuboid(DVec3::new(-0.1, -0.5, 0.05), DVec3::new(0.1, -0.4, 0.2), false, [rough; 6]);
+    room.scene.environment = Some(Arc::new(sky()));
+    let camera = Camera::looking_at(DVec3::new(0.02, 0.03, 0.49), DVec3::new(0.0, 0.0, -0.5), 1.2);
+    let squares = [
+        [0.5, 0.72],
+        [0.44, 0.93],
+        [0.72, 0.97],
+        [0.2, 0.85],
+        [0.26, 0.72],
+        [0.75, 0.85],
+        [0.68, 0.78],
+        [0.5, 0.86],
+        [0.5, 0.55],
+    ];
+    agrees(&room, &camera, &squares, 300_000, 1e-2);
+}
+
+#[test]
+fn a_mirror_ball_shows_what_is_far_away_at_half_its_radius() {
+    let mut room = Room::default();
+    let silver = room.material(Material::mirror(Vec3::ONE));
+    room.sphere(DVec3::new(0.0, 0.0, -1.1), 0.3, false, 64, silver);
+    room.scene.environment = Some(Arc::new(sky()));
+    let camera = Camera::looking_at(DVec3::ZERO, DVec3::NEG_Z, 0.3);
+    let depth = depth_in_the_middle(&room.scene, &camera, MirrorDepth::Focus, 0);
+    assert!((depth - 0.95).abs() < 5e-3, "{depth}");
 }
 
 /// Depth of the strongest point nearest to the picture's middle.

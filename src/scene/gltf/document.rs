@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// KHR_lights_punctual and KHR_materials_emissive_strength speak of candela, lux and nit; their numbers are taken as
 /// W/sr, W/m² and W/(m² sr), which keeps all ratios.
 pub const UNDERSTOOD_EXTENSIONS: &[&str] = &[
-    super::image_light::NAME,
+    "EXT_lights_image_based",
     "EXT_mesh_gpu_instancing",
     #[cfg(feature = "meshopt")]
     "EXT_meshopt_compression",

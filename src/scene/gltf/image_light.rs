@@ -14,7 +14,7 @@ use gltf::json;
 use serde::Deserialize;
 
 /// The extension's name.
-pub(super) const NAME: &str = "EXT_lights_image_based";
+const NAME: &str = "EXT_lights_image_based";
 
 /// Columns of the panorama that is made of the cube, for one column of a face, and most of them.
 const COLUMNS: usize = 4;
