@@ -16,14 +16,27 @@ const LONGEST: u64 = 1 << 31;
 
 /// Decodes a picture by what its bytes are. The error is one line without the file's name.
 pub(crate) fn decode(bytes: &[u8]) -> std::result::Result<image::DynamicImage, String> {
+    let mut reader = image::ImageReader::with_format(Cursor::new(bytes), checked_format(bytes)?);
+    reader.limits(limits(bytes.len() as u64));
+    reader.decode().map_err(|why| why.to_string())
+}
+
+/// Columns and rows of a picture by what its bytes are. The error is one line without the file's name.
+pub(crate) fn dimensions(bytes: &[u8]) -> std::result::Result<(u32, u32), String> {
     let unreadable = |why: image::ImageError| why.to_string();
-    let format = image::guess_format(bytes).map_err(unreadable)?;
+    let format = checked_format(bytes)?;
+    let mut reader = image::ImageReader::with_format(Cursor::new(bytes), format);
+    reader.limits(limits(bytes.len() as u64));
+    reader.into_dimensions().map_err(unreadable)
+}
+
+/// Kind of a picture, if what its directory says can be.
+fn checked_format(bytes: &[u8]) -> std::result::Result<image::ImageFormat, String> {
+    let format = image::guess_format(bytes).map_err(|why| why.to_string())?;
     if format == image::ImageFormat::Tiff && !tiff_directory_fits(&mut Cursor::new(bytes), bytes.len() as u64) {
         return Err("its directory promises more than the file holds".to_owned());
     }
-    let mut reader = image::ImageReader::with_format(Cursor::new(bytes), format);
-    reader.limits(limits(bytes.len() as u64));
-    reader.decode().map_err(unreadable)
+    Ok(format)
 }
 
 /// Opens a picture.

@@ -228,11 +228,9 @@ fn decode(path: &Path, bytes: &[u8], profile: Option<&PanelProfile>) -> Result<(
             return Ok((Picture::Gray { width, height, white, values }, metadata));
         }
     }
-    let unreadable = |e: image::ImageError| Error::input(path, format!("not a readable picture: {e}"));
-    let open = || image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(Error::io(path));
-    let (width, height) = open()?.into_dimensions().map_err(unreadable)?;
-    check_size(path, [width, height], profile.or(metadata.as_ref().map(|m: &FrameMetadata| &m.panel)))?;
     let unreadable = |why: String| Error::input(path, format!("not a readable picture: {why}"));
+    let (width, height) = pictures::dimensions(bytes).map_err(unreadable)?;
+    check_size(path, [width, height], profile.or(metadata.as_ref().map(|m: &FrameMetadata| &m.panel)))?;
     let image = pictures::decode(bytes).map_err(unreadable)?;
     let (width, height) = (image.width() as usize, image.height() as usize);
     let picture = match image {

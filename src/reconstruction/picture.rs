@@ -154,13 +154,13 @@ fn write_png(
 /// # Errors
 /// [`Error::Input`] for a file that is no picture, or one of more than 2²⁸ pixels.
 pub fn read_gray(path: &Path) -> Result<(usize, usize, Vec<f32>)> {
-    let refused = |e: image::ImageError| Error::input(path, format!("not a readable picture: {e}"));
-    let open = || image::ImageReader::open(path)?.with_guessed_format();
-    let (width, height) = open().map_err(Error::io(path))?.into_dimensions().map_err(refused)?;
+    let refused = |why: String| Error::input(path, format!("not a readable picture: {why}"));
+    let bytes = pictures::read(path)?;
+    let (width, height) = pictures::dimensions(&bytes).map_err(refused)?;
     if u64::from(width) * u64::from(height) > 1 << 28 {
         return Err(Error::input(path, format!("{width}×{height} pixels are too many")));
     }
-    let gray = pictures::open(path)?.into_luma16();
+    let gray = pictures::decode(&bytes).map_err(refused)?.into_luma16();
     let values = gray.into_raw().into_iter().map(|v| f32::from(v) / 65535.0).collect();
     Ok((width as usize, height as usize, values))
 }

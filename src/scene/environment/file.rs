@@ -59,17 +59,12 @@ type Texels = ([usize; 2], Vec<Vec3>);
 
 /// `.hdr`, or a picture in sRGB codes.
 fn picture(path: &Path) -> Result<Texels> {
-    let refused = |why: image::ImageError| Error::input(path, format!("is no panorama that can be read: {why}"));
-    let file = File::open(path).map_err(Error::io(path))?;
-    let reader = image::ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(Error::io(path))?;
-    let linear = matches!(reader.format(), Some(image::ImageFormat::Hdr));
-    let size = image::ImageReader::open(path)
-        .and_then(image::ImageReader::with_guessed_format)
-        .map_err(Error::io(path))?
-        .into_dimensions()
-        .map_err(refused)?;
-    check(path, size.0 as usize, size.1 as usize)?;
-    let texels = pictures::open(path)?.into_rgb32f();
+    let refused = |why: String| Error::input(path, format!("is no panorama that can be read: {why}"));
+    let bytes = pictures::read(path)?;
+    let (width, height) = pictures::dimensions(&bytes).map_err(refused)?;
+    check(path, width as usize, height as usize)?;
+    let linear = image::guess_format(&bytes).is_ok_and(|format| format == image::ImageFormat::Hdr);
+    let texels = pictures::decode(&bytes).map_err(refused)?.into_rgb32f();
     let size = [texels.width() as usize, texels.height() as usize];
     let code = |c: f32| if linear { c } else { linear_from_srgb(c) };
     Ok((size, texels.pixels().map(|p| Vec3::from_array(p.0.map(code))).collect()))

@@ -4,6 +4,7 @@ use super::document::Document;
 use super::ktx2;
 use super::resources::{MAX_FILE_BYTES, read_uri};
 use crate::error::Result;
+use crate::files::pictures;
 use crate::scene::Warning;
 use crate::scene::texture::{Level, Texture, Wrap};
 use gltf::json;
@@ -126,8 +127,9 @@ pub(super) fn image_bytes(document: &Document, image: &json::Image) -> Result<st
 
 /// Decodes PNG, JPEG, WebP or plain KTX2 by content, whatever the file's name or declared type says.
 pub(super) fn decode_picture(bytes: &[u8]) -> std::result::Result<image::RgbaImage, String> {
+    let most = pictures::limits(bytes.len() as u64).max_alloc.unwrap_or(u64::MAX).min(MAX_DECODER_BYTES);
     if bytes.starts_with(ktx2::IDENTIFIER) {
-        return ktx2::decode(bytes, MAX_IMAGE_SIDE, MAX_DECODER_BYTES);
+        return ktx2::decode(bytes, MAX_IMAGE_SIDE, most);
     }
     let format = match image::guess_format(bytes) {
         Ok(format @ (image::ImageFormat::Png | image::ImageFormat::Jpeg | image::ImageFormat::WebP)) => format,
@@ -137,7 +139,7 @@ pub(super) fn decode_picture(bytes: &[u8]) -> std::result::Result<image::RgbaIma
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_IMAGE_SIDE);
     limits.max_image_height = Some(MAX_IMAGE_SIDE);
-    limits.max_alloc = Some(MAX_DECODER_BYTES);
+    limits.max_alloc = Some(most);
     reader.limits(limits);
     let picture = reader.decode().map_err(|why| format!("it cannot be decoded ({why})"))?;
     Ok(picture.into_rgba8())

@@ -100,8 +100,8 @@ pub fn damaged(seed: &[u8], other: &[u8], kind: Kind, draw: &mut Draw) -> Vec<u8
         } else {
             byte_damage(&mut out, other, draw);
         }
+        out.truncate(LONGEST);
     }
-    out.truncate(LONGEST);
     out
 }
 
@@ -166,6 +166,7 @@ fn text_damage(out: &mut Vec<u8>, draw: &mut Draw) {
         let end = ends.iter().find(|i| **i >= from).map_or(out.len(), |i| i + 1).max(start);
         let line = out[start..end].to_vec();
         let times = *draw.of(&[0, 2, 2, 50]);
+        let times = if line.len() * times > LONGEST { 1 } else { times };
         out.splice(start..end, line.repeat(times));
         return;
     }

@@ -170,13 +170,13 @@ pub fn all() -> Result<Vec<Parser>, Fault> {
         })?,
         Parser::new("frames", seeds::frames(), of_file(|path| said(Frame::read(path, None, None))))?,
         Parser::new("frame-texts", seeds::frame_texts(), {
-            parsed(move |text| {
-                let metadata: FrameMetadata = serde_json::from_str(text).map_err(|why| why.to_string())?;
+            Box::new(move |folder, parts| {
+                let Some((_, bytes)) = parts.first() else { return Ok(()) };
+                let metadata: FrameMetadata = serde_json::from_slice(bytes).map_err(|why| why.to_string())?;
                 let levels = vec![0; 96];
                 let mut frame = Frame::new(&panel, 532e-9, levels).map_err(|why| why.to_string())?;
                 frame.metadata = metadata;
-                let folder = tempfile::tempdir().map_err(|why| why.to_string())?;
-                let path = folder.path().join("a.png");
+                let path = folder.join("a.png");
                 // What cannot be written was refused; what can be is read as a stranger's file.
                 if frame.write(&path).is_err() {
                     return Ok(());

@@ -12,6 +12,9 @@ pub const MOST_MEMORY: usize = 200 << 20;
 /// Longest that a reader may take for an input [s].
 pub const MOST_SECONDS: u64 = 10;
 
+/// What is held where the process is ended before the system does it [bytes].
+const TOO_MUCH: usize = 3 << 30;
+
 static HELD: AtomicUsize = AtomicUsize::new(0);
 static MOST: AtomicUsize = AtomicUsize::new(0);
 
@@ -52,7 +55,7 @@ pub fn memory_of<T>(work: impl FnOnce() -> T) -> (T, usize) {
     (out, MOST.load(Ordering::Relaxed).saturating_sub(before))
 }
 
-/// Ends the process where one input takes too long, after keeping it: a loop without end cannot be ended otherwise.
+/// Ends the process where one input takes too long or all memory, after keeping it: neither can be ended otherwise.
 pub struct Watchdog {
     begun: Instant,
     since: AtomicU64,
@@ -68,12 +71,14 @@ impl Watchdog {
             Box::leak(Box::new(Self { begun: Instant::now(), since, watched, input: Mutex::default() }));
         std::thread::spawn(move || {
             loop {
-                std::thread::sleep(Duration::from_millis(500));
+                std::thread::sleep(Duration::from_millis(50));
                 let late = dog.begun.elapsed().as_millis() as u64 - dog.since.load(Ordering::Acquire);
-                if dog.watched.load(Ordering::Acquire) && late > 1000 * MOST_SECONDS {
+                let greedy = HELD.load(Ordering::Relaxed) > TOO_MUCH;
+                if dog.watched.load(Ordering::Acquire) && (greedy || late > 1000 * MOST_SECONDS) {
                     let Ok(input) = dog.input.lock() else { continue };
                     let kept = keep(&input.0, "hang", &input.1);
-                    eprintln!("{}: no end within {MOST_SECONDS} s; the input is {}", input.0, kept.display());
+                    let what = if greedy { "no end of memory" } else { "no end of time" };
+                    eprintln!("{}: {what}; the input is {}", input.0, kept.display());
                     std::process::exit(1);
                 }
             }
