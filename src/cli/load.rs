@@ -11,7 +11,9 @@ use holodrive::pipeline;
 use holodrive::points::depth_map::DepthReading;
 use holodrive::points::images::RgbDepth;
 use holodrive::points::placement::Phase;
-use holodrive::points::{LitScene, Placement, PointCloud, Reach, ScenePoints, SceneSettings, clouds, images, ply};
+use holodrive::points::{
+    Axes, LitScene, Placement, PointCloud, Reach, ScenePoints, SceneSettings, clouds, images, ply,
+};
 use holodrive::progress::Progress;
 use holodrive::scene::gltf;
 use holodrive::units;
@@ -97,6 +99,8 @@ pub(super) struct Reading {
     pub(super) depth: DepthReading,
     /// Where a cloud is placed; none: where its file says.
     pub(super) placement: Option<Placement>,
+    /// A cloud's axes that were typed.
+    pub(super) axes: Option<Axes>,
     /// Whether a cloud's phases are those that were typed.
     pub(super) is_phase_typed: bool,
     /// Distance of the viewer's eye [m].
@@ -205,6 +209,13 @@ impl Points {
             report.add("read", &read.origin, format!("{:<12} {}", "read", read.origin));
         }
         let (mut cloud, mut metadata) = (read.cloud, read.metadata.unwrap_or_default());
+        // Points that stand where their file says are turned only if that was asked for.
+        if let Some(axes) = reading.axes.or(read.axes.filter(|_| placement.is_some())) {
+            axes.turn(&mut cloud);
+            let mirrored = if axes.mirrors() { " (mirrored)" } else { "" };
+            let said = format!("{axes}{mirrored}");
+            report.add("axes", &said, format!("{:<12} {said}", "axes"));
+        }
         if metadata.frame == ply::Frame::World && placement.is_none() {
             let what = "its points stand in the scene's own metres; write them with --frame hologram, or place them by \
                         --placement model";

@@ -117,6 +117,7 @@ pub(super) fn reading(map: &DepthMapArgs, placement: &PlacementArgs) -> Reading 
     Reading {
         depth: map.reading(),
         placement: placement.is_asked().then(|| self::placement(placement)),
+        axes: placement.axes,
         is_phase_typed: placement.phase.is_some(),
         viewer: placement.viewer,
     }

@@ -49,7 +49,8 @@ pub fn read(path: &Path) -> Result<Stored> {
 }
 
 fn of_array(path: &Path, array: Array, metadata: Option<FieldMetadata>) -> Result<Stored> {
-    let origin = array.origin.clone();
+    let parts = array.parts().map_or(String::new(), |parts| format!(", {parts}"));
+    let origin = format!("{}{parts}", array.origin);
     let (width, height, values) = array.picture(path)?;
     let refused =
         |i: usize, what: &str| Error::input(path, format!("value at row {}, column {} {what}", i / width, i % width));

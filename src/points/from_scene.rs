@@ -171,7 +171,8 @@ impl LitScene {
             let what = if light.is_dark() {
                 "its lights give no light; raise their intensity or emission"
             } else {
-                "no ray of its camera meets light; look at the camera and the lights"
+                "no ray of its camera meets light: look at the camera, at the lights, and whether all that is seen is black, turned away, \
+                 or mirrors nothing (an environment is something to mirror)"
             };
             return Err(Error::input(&self.path, what));
         }

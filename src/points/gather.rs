@@ -160,7 +160,7 @@ impl Gather {
         let amplitude = match self.light {
             Light::Amplitude => point.amplitude as f32,
             // Powers until their greatest is known.
-            Light::Intensity => point.intensity.max(0.0) as f32,
+            Light::Intensity => point.intensity as f32,
             _ => 1.0,
         };
         match self.light {
@@ -189,11 +189,17 @@ impl Gather {
                 read.origin = format!("{count} Gaussian splats, taken as points of their colour and opacity")
             }
             Light::Intensity => {
-                let most = self.points.iter().fold(0.0, |a: f32, p| a.max(p.amplitude));
-                if most > 0.0 {
-                    self.points.iter_mut().for_each(|p| p.amplitude = (p.amplitude / most).sqrt());
+                let most = self.points.iter().fold(f32::NEG_INFINITY, |a, p| a.max(p.amplitude));
+                // Some scanners count from the middle of their range.
+                let least = self.points.iter().fold(0.0, |a: f32, p| a.min(p.amplitude));
+                if most > least {
+                    self.points.iter_mut().for_each(|p| p.amplitude = ((p.amplitude - least) / (most - least)).sqrt());
+                    let from = if least < 0.0 { format!(" from {least}, which is taken as 0,") } else { String::new() };
+                    read.origin = format!("{count} points with intensities{from} up to {most}, which is taken as 1");
+                } else if !self.points.is_empty() {
+                    self.points.iter_mut().for_each(|p| p.amplitude = 1.0);
+                    read.warnings.push(format!("all its intensities are {most}; its points are taken as white"));
                 }
-                read.origin = format!("{count} points with intensities up to {most}, which is taken as 1");
             }
             _ => {}
         }
@@ -221,6 +227,10 @@ impl Gather {
         });
         if self.full.is_none() && full > 1.0 {
             read.origin = format!("colours as floats up to {most}, taken as parts of {full}");
+        }
+        if most <= 0.0 && !self.rgb.is_empty() {
+            self.rgb.fill([full as f32; 3]);
+            read.warnings.push("all its colours are black; its points are taken as white".into());
         }
         let mut clamped = 0;
         for rgb in &mut self.rgb {

@@ -22,6 +22,7 @@
 //! # Ok::<(), holodrive::Error>(())
 //! ```
 
+mod axes;
 pub mod budget;
 pub mod clouds;
 pub mod colour;
@@ -50,6 +51,7 @@ mod view;
 mod wavefront;
 pub(crate) mod white;
 
+pub use axes::Axes;
 pub use exposure::{Exposure, Share};
 pub use from_scene::{LitScene, ScenePoints, SceneSettings};
 pub use placed::{Placed, place};

@@ -2,6 +2,7 @@
 
 use super::parse::{one_of, range};
 use clap::{Args, ValueEnum};
+use holodrive::points::Axes;
 use holodrive::points::depth_map::{DepthReading, DepthScale};
 use holodrive::points::placement::Phase;
 use holodrive::units;
@@ -33,6 +34,9 @@ pub(crate) struct PlacementArgs {
     /// model: metres at the panel for one metre (of a cloud: one unit) of the scene [default: fits the view].
     #[arg(hide_short_help = true, long, value_name = "FACTOR")]
     pub(crate) scale: Option<f64>,
+    /// A cloud's axes to the right, up and towards the viewer [default: x,y,z; of a depth camera's .pcd x,-y,-z].
+    #[arg(hide_short_help = true, long, value_name = "AXES", allow_hyphen_values = true)]
+    pub(crate) axes: Option<Axes>,
     /// Initial phase of the points [default: random; of a point cloud what its file says].
     #[arg(hide_short_help = true, long, value_parser = one_of::<Phase>(), value_name = "PHASE")]
     pub(crate) phase: Option<Phase>,

@@ -33,6 +33,16 @@ impl Array {
         Self { shape, values: values.taken(&at), origin }
     }
 
+    /// Which axis of it is taken as real and imaginary part by [`Array::picture`], in words.
+    pub fn parts(&self) -> Option<&'static str> {
+        let sides: Vec<usize> = self.shape.iter().copied().filter(|side| *side != 1).collect();
+        match (&sides[..], &self.values) {
+            ([2, _, _], Values::Real(_)) => Some("the halves along its first axis taken as real and imaginary parts"),
+            ([_, _, 2], Values::Real(_)) => Some("the halves along its last axis taken as real and imaginary parts"),
+            _ => None,
+        }
+    }
+
     /// The one picture in it: columns, rows and values row by row.
     ///
     /// Sides of 1 before and behind it are left off. A side of 2 before or behind two others in an array of floats is real
@@ -62,6 +72,9 @@ impl Array {
                 let pairs = values.chunks_exact(2).map(|pair| (&pair[0], &pair[1]));
                 Ok((width, height, Values::Complex(paired(pairs))))
             }
+            (&[_, _, channels @ (3 | 4)], _) => Err(refused(&format!(
+                "is a picture of {channels} channels; one of them is needed, or a file of a picture (.png)"
+            ))),
             (&[count, ..], _) if shape.len() > 2 => Err(refused(&format!(
                 "holds {count} or more pictures; one of height × width is needed: save one of them"
             ))),

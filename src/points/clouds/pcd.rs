@@ -3,6 +3,7 @@
 use super::{Gather, Role, Vertex};
 use crate::error::{Error, Result};
 use crate::field::arrays::{Class, Element, lzf};
+use crate::points::Axes;
 use crate::points::ply::Read;
 use std::path::Path;
 
@@ -20,7 +21,8 @@ struct Column {
 pub(super) fn read(path: &Path) -> Result<Read> {
     let bytes = std::fs::read(path).map_err(Error::io(path))?;
     let refused = |what: String| Error::input(path, what);
-    let (columns, count, kind, begin) = head(&bytes).map_err(|why| refused(format!("not a .pcd: {why}")))?;
+    let Head { columns, points: count, kind, begin, organised } =
+        head(&bytes).map_err(|why| refused(format!("not a .pcd: {why}")))?;
     let data = &bytes[begin..];
     let wide: usize = columns.iter().map(|c| c.element.bytes).sum();
     let roles: Vec<Role> = columns.iter().flat_map(roles_of).collect();
@@ -84,7 +86,12 @@ pub(super) fn read(path: &Path) -> Result<Read> {
             }
         }
     }
-    Ok(gather.finish())
+    let mut read = gather.finish();
+    // A picture of points before a camera: rows run down, and what is seen is away from it.
+    if organised && !read.cloud.points.is_empty() && read.cloud.points.iter().all(|p| p.position.z > 0.0) {
+        read.axes = Some(Axes::CAMERA);
+    }
+    Ok(read)
 }
 
 /// What a column gives: a colour's three parts, or itself.
@@ -104,10 +111,21 @@ fn put(gather: &Gather, column: &Column, value: f64, bits: u32, point: &mut Vert
     }
 }
 
-/// Columns, number of points, kind of data, and where they begin.
-fn head(bytes: &[u8]) -> Result<(Vec<Column>, usize, String, usize), String> {
+/// What stands before the points.
+struct Head {
+    columns: Vec<Column>,
+    points: usize,
+    /// ascii, binary or binary_compressed.
+    kind: String,
+    /// Where the data begin.
+    begin: usize,
+    /// Whether the points stand in rows, as a camera's do.
+    organised: bool,
+}
+
+fn head(bytes: &[u8]) -> Result<Head, String> {
     let (mut names, mut sizes, mut types, mut counts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let (mut points, mut at) = (None, 0);
+    let (mut points, mut at, mut organised) = (None, 0, false);
     loop {
         let rest = &bytes[at..bytes.len().min(MOST_HEAD)];
         let end = rest.iter().position(|b| *b == b'\n').ok_or("its head does not end with DATA")?;
@@ -121,6 +139,7 @@ fn head(bytes: &[u8]) -> Result<(Vec<Column>, usize, String, usize), String> {
             "SIZE" => sizes = values.iter().map(number).collect::<Result<_, _>>()?,
             "TYPE" => types = values.to_vec(),
             "COUNT" => counts = values.iter().map(number).collect::<Result<_, _>>()?,
+            "HEIGHT" => organised = values.first().is_some_and(|rows| number(rows).is_ok_and(|rows| rows > 1)),
             "POINTS" => points = Some(number(values.first().ok_or("POINTS has no number")?)?),
             "DATA" => {
                 let kind = values.first().cloned().unwrap_or_default().to_lowercase();
@@ -129,9 +148,10 @@ fn head(bytes: &[u8]) -> Result<(Vec<Column>, usize, String, usize), String> {
                 }
                 counts.resize(names.len(), 1);
                 let columns = columns(&names, &sizes, &types, &counts)?;
-                return Ok((columns, points.ok_or("it does not say how many points")?, kind, at));
+                let points = points.ok_or("it does not say how many points")?;
+                return Ok(Head { columns, points, kind, begin: at, organised });
             }
-            _ if key.starts_with('#') || ["VERSION", "WIDTH", "HEIGHT", "VIEWPOINT"].contains(&key.as_str()) => {}
+            _ if key.starts_with('#') || ["VERSION", "WIDTH", "VIEWPOINT"].contains(&key.as_str()) => {}
             _ => return Err(format!("`{key:.40}` is not understood")),
         }
     }

@@ -24,12 +24,12 @@ pub(super) fn read(path: &Path) -> Result<Read> {
             Some(rest) => (rest, true),
             None => (line.as_str(), false),
         };
-        let words: Vec<&str> =
-            text.split([',', ';', '\t', ' ']).map(|w| w.trim_matches(['"', '\''])).filter(|w| !w.is_empty()).collect();
+        let words = words_of(text);
         if words.is_empty() || (is_comment && (names.is_some() || !first.is_empty())) {
             continue;
         }
-        let numbers: Result<Vec<f64>, &str> = words.iter().map(|word| word.parse().map_err(|_| *word)).collect();
+        // A column that was left empty was not measured.
+        let numbers: Result<Vec<f64>, &str> = words.iter().map(|word| number(word)).collect();
         match numbers {
             // A comment of numbers is no point.
             _ if is_comment && roles_of(&words).is_none() => {}
@@ -79,6 +79,29 @@ pub(super) fn read(path: &Path) -> Result<Read> {
     let origin = format!("{} points, columns {said}", read.cloud.points.len());
     read.origin = if read.origin.is_empty() { origin } else { format!("{origin}; {}", read.origin) };
     Ok(read)
+}
+
+/// The words of a line. Where it has commas, semicolons or tabs, these part it, and a name in quotes may have blanks; else
+/// blanks do.
+fn words_of(text: &str) -> Vec<&str> {
+    if let Some(mark) = [';', '\t', ','].into_iter().find(|mark| text.contains(*mark)) {
+        let words: Vec<&str> = text.split(mark).map(str::trim).collect();
+        let whole = |word: &&str| word.starts_with(['"', '\'']) || !word.contains([' ', '\t', ',']);
+        if words.iter().all(whole) {
+            let filled = words.iter().rposition(|word| !word.is_empty()).map_or(0, |last| last + 1);
+            return words[..filled].iter().map(|word| bare(word)).collect();
+        }
+    }
+    text.split([',', ';', '\t', ' ']).map(bare).filter(|word| !word.is_empty()).collect()
+}
+
+fn number(word: &str) -> Result<f64, &str> {
+    if word.is_empty() { Ok(f64::NAN) } else { word.parse().map_err(|_| word) }
+}
+
+/// A word without its quotes.
+fn bare(word: &str) -> &str {
+    word.trim_matches(['"', '\''])
 }
 
 /// What columns of these names are, where there is a position among them.

@@ -149,3 +149,45 @@ fn laser_scans_have_their_colours_and_leave_out_what_was_withheld() {
     promising.extend([[0u8; 20].as_slice(), &(1u64 << 63).to_le_bytes(), &[0; 32]].concat());
     refused("a.las", &promising, "beyond its end");
 }
+
+#[test]
+fn names_in_quotes_may_have_blanks_and_columns_may_be_empty() {
+    let read = of(
+        "a.csv",
+        "\"x\",\"y\",\"z\",\"M3C2 distance\",\"red\",\"green\",\"blue\"\n1,2,3,,255,0,51\n4, 5 ,6,0.1,0,255,0,\n",
+    );
+    assert_eq!(read.cloud.points.len(), 2);
+    assert_eq!(read.cloud.points[1].position, DVec3::new(4.0, 5.0, 6.0));
+    assert_eq!(read.cloud.rgb.expect("coloured")[0], [1.0, 0.0, 0.2]);
+}
+
+#[test]
+fn what_is_all_dark_is_taken_as_white_and_scanners_count_below_zero() {
+    let white = of("a.xyz", "1 2 3 0 0 0\n4 5 6 0 0 0\n");
+    assert!(
+        white.cloud.points.iter().all(|p| p.amplitude == 1.0) && white.warnings[0].contains("black"),
+        "{:?}",
+        white.warnings
+    );
+    let none = of("a.pts", "2\n1 2 3 0\n4 5 6 0\n");
+    assert!(
+        none.cloud.points.iter().all(|p| p.amplitude == 1.0) && none.warnings[0].contains("white"),
+        "{:?}",
+        none.warnings
+    );
+    let leica = of("a.pts", "3\n1 2 3 -2048\n4 5 6 2048\n7 8 9 0\n");
+    let light: Vec<f32> = leica.cloud.points.iter().map(|p| p.amplitude * p.amplitude).collect();
+    assert!(light.iter().zip([0.0, 1.0, 0.5]).all(|(a, b)| (a - b).abs() < 1e-6), "{light:?}");
+}
+
+#[test]
+fn points_in_rows_before_a_camera_have_its_axes() {
+    let rows = |height: usize, z: f32| {
+        let head = String::from_utf8(pcd("x y z", "4 4 4", "F F F", 2, "ascii")).expect("text");
+        let head = head.lines().filter(|line| !line.starts_with("HEIGHT")).collect::<Vec<_>>().join("\n");
+        let head = head.replace("DATA", &format!("HEIGHT {height}\nDATA"));
+        of("a.pcd", format!("{head}\n0 1 {z}\n1 2 3\n")).axes
+    };
+    assert_eq!(rows(2, 1.0), Some(crate::points::Axes::CAMERA));
+    assert_eq!((rows(1, 1.0), rows(2, -1.0)), (None, None));
+}

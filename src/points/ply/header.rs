@@ -120,6 +120,10 @@ pub(super) fn read(input: &mut impl BufRead, path: &Path) -> Result<Header> {
         let refuse = |what: &str| Err(Error::input(path, format!("header line {number}: {what}: `{line}`")));
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
         if number == 1 {
+            if words.first() == Some(&"ply") && line.contains('\r') {
+                let what = "its lines end by a carriage return alone, as on very old machines; end them by a line feed";
+                return Err(Error::input(path, what));
+            }
             if words != ["ply"] {
                 return Err(Error::input(path, "not a PLY file: its first line is not `ply`"));
             }

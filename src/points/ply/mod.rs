@@ -11,7 +11,7 @@ mod write;
 pub use read::read;
 pub use write::write;
 
-use super::PointCloud;
+use super::{Axes, PointCloud};
 use crate::names::{Name, Named};
 use serde::{Deserialize, Serialize};
 
@@ -67,6 +67,8 @@ pub struct Read {
     pub origin: String,
     /// Repairs and assumptions, in words.
     pub warnings: Vec<String>,
+    /// Its axes, where they are known to be others than right, up and towards the viewer.
+    pub axes: Option<Axes>,
 }
 
 #[cfg(test)]

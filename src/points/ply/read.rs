@@ -55,6 +55,12 @@ pub fn read(path: &Path) -> Result<Read> {
         return Err(Error::input(path, what));
     }
     vertices(element, &mut values, &mut out)?;
+    if let Some(faces) = header.elements[at + 1..].iter().find(|e| e.name == "face" && e.count > 0) {
+        let count = faces.count;
+        out.warnings.push(format!(
+            "its {count} faces are left out: points are not lit or hidden; a mesh is .gltf, .obj or .stl"
+        ));
+    }
     Ok(out)
 }
 
@@ -77,7 +83,9 @@ fn vertices(element: &Element, values: &mut Values, out: &mut Read) -> Result<()
     let roles: Vec<Role> = element.properties.iter().map(of).collect();
     for (axis, name) in ["x", "y", "z"].iter().enumerate() {
         if !roles.contains(&Role::Position(axis)) {
-            return Err(Error::input(path, format!("its vertices have no `{name}`")));
+            let packed = element.properties.iter().any(|p| p.name == "packed_position");
+            let hint = if packed { ": splats as SuperSplat packs them; export them as a plain PLY" } else { "" };
+            return Err(Error::input(path, format!("its vertices have no `{name}`{hint}")));
         }
     }
     let mut gather = Gather::new(&roles, element.count as usize);

@@ -97,7 +97,10 @@ fn symbols(
             let (name, address) = (at.long()?, at.long()?);
             at.skip(24)?;
             let name = usize::try_from(name).ok().and_then(|begin| names.get(begin..)).ok_or("a name is cut off")?;
-            out.push((text(name), address));
+            // A soft link names another place, and has none.
+            if address != u64::MAX {
+                out.push((text(name), address));
+            }
         }
         return Ok(());
     }

@@ -58,6 +58,14 @@ fn mended(materials: &str) -> String {
 pub(super) fn convert(source: Source, bytes: &[u8], warnings: &mut Vec<Warning>) -> Result<Converted, String> {
     // Old exporters write names in alphabets of their own, and break long lines by a backslash.
     let text = String::from_utf8_lossy(bytes).replace("\\\r\n", " ").replace("\\\n", " ");
+    // A material without a name is none.
+    let nameless = |line: &str| line.trim() == "usemtl";
+    let text = match text.lines().any(nameless) {
+        true => {
+            text.lines().map(|line| if nameless(line) { "\n" } else { line }.trim_end().to_owned() + "\n").collect()
+        }
+        false => text,
+    };
     let mut reader = Counted { left: text.as_bytes(), line: 0 };
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
     let (said, beside) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
@@ -87,7 +95,9 @@ pub(super) fn convert(source: Source, bytes: &[u8], warnings: &mut Vec<Warning>)
     let mut images = Vec::new();
     let mut told: Vec<Value> = materials.iter().map(|material| material_of(material, &mut images)).collect();
     let grey = told.len();
-    told.push(json!({"pbrMetallicRoughness": {"baseColorFactor": [0.7, 0.7, 0.7, 1.0], "metallicFactor": 0.0}}));
+    let plain = json!({"baseColorFactor": [0.7, 0.7, 0.7, 1.0], "metallicFactor": 0.0});
+    // Neither format says which side of a face is its front.
+    told.push(json!({"pbrMetallicRoughness": plain, "doubleSided": true}));
     let mut arrays = Arrays::default();
     let mut primitives = Vec::new();
     for mesh in models.iter().map(|model| &model.mesh).filter(|mesh| !mesh.indices.is_empty()) {

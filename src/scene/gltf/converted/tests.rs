@@ -99,3 +99,14 @@ fn stl_as_text_or_binary_stands_upright() {
         assert!(!said.contains('\n'), "{said}");
     }
 }
+
+#[test]
+fn careless_programs_files_are_read_from_both_sides() {
+    // A material without a name; clockwise from the front.
+    let obj = b"v 0 0 0\nv 0 1 0\nv 1 0 0\nusemtl \nf 1 2 3\nusemtl\nf 1 3 2\n";
+    let scene = loaded(&[("a.obj", obj)]).expect("scene").scene;
+    assert!(scene.triangles.len() == 2 && material_of(&scene, 0).double_sided);
+    let stl = b"solid\tball\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n";
+    let scene = loaded(&[("a.stl", stl)]).expect("scene").scene;
+    assert!(scene.triangles.len() == 1 && material_of(&scene, 0).double_sided);
+}
