@@ -301,7 +301,7 @@ fn a_panorama_lights_a_scene_and_is_seen_in_its_mirror() {
         assert!(!said.contains("no light"), "{said}");
         let picture = holodrive::field::npy::read_real(&f.join("p.npy")).expect("picture");
         let lit: Vec<&[f32]> = picture.values.chunks(3).filter(|p| p.iter().sum::<f32>() > 0.3).collect();
-        assert!(lit.len() > 200, "{scene}: {} of 1600 pixels are lit", lit.len());
+        assert!(lit.len() > 100, "{scene}: {} of 1600 pixels are lit", lit.len());
         // The camera that was added looks from above: a white floor and a mirror both show the sky.
         for pixel in lit {
             assert!((pixel[0] - 0.5 * wanted).abs() < 0.06 && pixel[2] < 0.06, "{scene}: {pixel:?}");

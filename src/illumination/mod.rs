@@ -75,7 +75,7 @@ use glam::Vec3;
 use images::Images;
 use lamp_image::Lamps;
 use meshing::Fineness;
-use patches::Patches;
+use patches::{Found, Patches};
 use paths::Optics;
 use radiosity::{Surroundings, Transport};
 use rayon::prelude::*;
@@ -278,7 +278,8 @@ impl Illumination {
             radiosity::solve(&source, bounce, |b| transport.gather(b, scale), settings.residual, 200, progress)?;
         let reflected = bounce(&irradiance);
         let leaving: Vec<Vec3> = source.iter().zip(&reflected).map(|(s, r)| *s + *r).collect();
-        let energy = patches.energy(&surroundings, &emitters, &transport, &leaving, &irradiance, &sky, settings.seed);
+        let found = Found { leaving: &leaving, irradiance: &irradiance, sky: &sky };
+        let energy = patches.energy(&surroundings, &emitters, &transport, found, settings.seed);
         let irradiance = irradiance.iter().zip(&weak).zip(&sky).map(|((i, w), s)| *i + *w + *s).collect();
         let mut light = Self {
             settings,

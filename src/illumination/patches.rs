@@ -27,6 +27,17 @@ pub(crate) struct Patches {
     punctual: Vec<Vec3>,
 }
 
+/// What the solver found.
+#[derive(Clone, Copy)]
+pub(crate) struct Found<'a> {
+    /// Radiance that leaves each sender.
+    pub(crate) leaving: &'a [Vec3],
+    /// Irradiance over π at the vertices, by way of other surfaces.
+    pub(crate) irradiance: &'a [Vec3],
+    /// The same of the environment.
+    pub(crate) sky: &'a [Vec3],
+}
+
 impl Patches {
     /// Reads materials and samples direct light at a few places of each sender.
     pub(crate) fn new(
@@ -103,18 +114,16 @@ impl Patches {
         }
     }
 
-    /// Where the light went, for the radiance that leaves each sender, the irradiance by way of others at vertices, and that of
-    /// the `sky`.
+    /// Where the light went.
     pub(crate) fn energy(
         &self,
         around: &Surroundings,
         emitters: &Emitters,
         transport: &Transport,
-        leaving: &[Vec3],
-        irradiance: &[Vec3],
-        sky: &[Vec3],
+        found: Found,
         seed: u64,
     ) -> Energy {
+        let Found { leaving, irradiance, sky } = found;
         let (mesh, bvh) = (around.mesh, &around.optics.bvh);
         let mut sums = [[0.0f64; 3]; 3];
         let mut add = |which: usize, flux: Vec3| {
