@@ -6,8 +6,8 @@ use serde_json::{Map, Value};
 pub struct Draw(pub u64);
 
 impl Draw {
-    /// The next number.
-    pub fn next(&mut self) -> u64 {
+    /// The next 64 bits.
+    pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -15,7 +15,7 @@ impl Draw {
     }
     /// A number below `end`, 0 where that is 0.
     pub fn below(&mut self, end: usize) -> usize {
-        (self.next() % (end.max(1) as u64)) as usize
+        (self.bits() % (end.max(1) as u64)) as usize
     }
     /// One of several.
     pub fn of<'a, T>(&mut self, all: &'a [T]) -> &'a T {
@@ -123,7 +123,7 @@ fn byte_damage(out: &mut Vec<u8>, other: &[u8], draw: &mut Draw) {
     let at = draw.below(out.len());
     match draw.below(9) {
         0 => out.iter_mut().skip(at).take(1).for_each(|b| *b ^= 1 << (at % 8)),
-        1 => out.iter_mut().skip(at).take(1).for_each(|b| *b = draw.next() as u8),
+        1 => out.iter_mut().skip(at).take(1).for_each(|b| *b = draw.bits() as u8),
         2 | 3 => {
             let wide = *draw.of(&[1, 2, 4, 8]);
             let mut edge = draw.of(&EDGES).to_le_bytes();
@@ -144,7 +144,7 @@ fn byte_damage(out: &mut Vec<u8>, other: &[u8], draw: &mut Draw) {
             out.splice(to..to, piece);
         }
         6 => {
-            let piece: Vec<u8> = (0..=draw.below(8)).map(|_| draw.next() as u8).collect();
+            let piece: Vec<u8> = (0..=draw.below(8)).map(|_| draw.bits() as u8).collect();
             out.splice(at..at, piece);
         }
         7 => out.truncate(at),
