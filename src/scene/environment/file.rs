@@ -6,8 +6,6 @@ use crate::files::pictures;
 use crate::scene::texture::linear_from_srgb;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 /// Most texels of a file: 16,384 × 8,192.
@@ -81,6 +79,8 @@ fn check(path: &Path, width: usize, height: usize) -> Result<()> {
 #[cfg(feature = "exr")]
 fn exr(path: &Path) -> Result<Texels> {
     use exr::prelude::{ReadChannels as _, ReadLayers as _};
+    use std::fs::File;
+    use std::io::BufReader;
     let refused = |why: exr::error::Error| Error::input(path, format!("not an EXR that can be read: {why}"));
     let open = || File::open(path).map_err(Error::io(path)).map(BufReader::new);
     let head = exr::meta::MetaData::read_from_buffered(open()?, false).map_err(refused)?;
@@ -117,6 +117,7 @@ fn exr(path: &Path) -> Result<Texels> {
 mod tests {
     use super::*;
     use glam::DVec3;
+    use std::fs::File;
 
     /// Left half red, right half green, twice as bright below.
     fn light(x: usize, y: usize) -> [f32; 3] {

@@ -8,7 +8,7 @@ mod draco;
 #[cfg(feature = "meshopt")]
 mod meshopt;
 
-#[cfg(test)]
+#[cfg(all(test, feature = "draco", feature = "meshopt"))]
 mod tests;
 
 use crate::error::Result;
