@@ -8,8 +8,8 @@ use std::path::Path;
 /// Bytes that a byte of a file unfolds to at most: deflate's limit, and about that of LZW and JPEG.
 const MOST_OF_A_BYTE: u64 = 1100;
 
-/// What any picture may take, however small its file is [bytes]: 4096 × 4096 pixels of four bytes.
-const FREE: u64 = 1 << 26;
+/// What any picture may take, however small its file is [bytes]: 3840 × 2160 pixels of four bytes.
+const FREE: u64 = 1 << 25;
 
 /// Longest file that is read [bytes].
 const LONGEST: u64 = 1 << 31;

@@ -26,9 +26,14 @@ pub(super) fn read(path: &Path) -> Result<Read> {
     let data = &bytes[begin..];
     let wide: usize = columns.iter().map(|c| c.element.bytes).sum();
     let roles: Vec<Role> = columns.iter().flat_map(roles_of).collect();
-    let least = if kind == "ascii" { 2 * columns.len() } else { wide };
-    let most_packing = if kind == "binary_compressed" { 300 } else { 1 };
-    if count.saturating_mul(least) > data.len().saturating_add(1).saturating_mul(most_packing) {
+    let most = match kind.as_str() {
+        // A digit and a blank for each value, but for the last blank.
+        "ascii" => (data.len() + 1) / (2 * columns.len()).max(1),
+        "binary" => data.len() / wide.max(1),
+        // What LZF makes of a byte, at most.
+        _ => data.len().saturating_mul(300) / wide.max(1),
+    };
+    if count > most {
         return Err(refused(format!(
             "promises {count} points, more than its {} bytes can hold: truncated?",
             data.len()

@@ -108,6 +108,8 @@ fn pcd_of_each_kind_gives_the_same_points() {
     assert_eq!(of("a.pcd", &copied[..copied.len() - 1]).cloud.points[0].position, DVec3::ZERO);
     refused("a.pcd", pcd("x y", "4 4", "F F", 1, "ascii"), "no x, y and z");
     refused("a.pcd", pcd("x y z", "4 4 4", "F F F", usize::MAX, "binary"), "truncated");
+    // A byte too few.
+    refused("a.pcd", &binary[..binary.len() - 1], "truncated");
     refused("a.pcd", b"hello", "not a .pcd");
 }
 

@@ -27,6 +27,9 @@ const SPARED_SIDE: usize = 256;
 const MAX_IMAGE_SIDE: u32 = 32_768;
 const MAX_DECODER_BYTES: u64 = 256 << 20;
 
+/// What a small file's picture may take less than elsewhere.
+const SMALL_PICTURES: u64 = 1 << 24;
+
 /// Textures decoded so far. The same image under two samplers, or as colour and as data, is two textures.
 #[derive(Default)]
 pub(super) struct Textures {
@@ -127,7 +130,9 @@ pub(super) fn image_bytes(document: &Document, image: &json::Image) -> Result<st
 
 /// Decodes PNG, JPEG, WebP or plain KTX2 by content, whatever the file's name or declared type says.
 pub(super) fn decode_picture(bytes: &[u8]) -> std::result::Result<image::RgbaImage, String> {
-    let most = pictures::limits(bytes.len() as u64).max_alloc.unwrap_or(u64::MAX).min(MAX_DECODER_BYTES);
+    // A texture takes seven times its picture's memory.
+    let most = pictures::limits(bytes.len() as u64).max_alloc.unwrap_or(u64::MAX).saturating_sub(SMALL_PICTURES);
+    let most = most.min(MAX_DECODER_BYTES);
     if bytes.starts_with(ktx2::IDENTIFIER) {
         return ktx2::decode(bytes, MAX_IMAGE_SIDE, most);
     }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 pub const MOST_MEMORY: usize = 200 << 20;
 
 /// Longest that a reader may take for an input [s].
-pub const MOST_SECONDS: u64 = 10;
+pub const MOST_SECONDS: u64 = 30;
 
 /// What is held where the process is ended before the system does it [bytes].
 const TOO_MUCH: usize = 3 << 30;
