@@ -98,6 +98,9 @@ impl Vertex {
     }
 }
 
+/// Intensities are signed numbers where the least is farther below zero than this part of the greatest.
+const SIGNED: f32 = 0.25;
+
 impl Gather {
     /// For files with these properties.
     pub(super) fn new(roles: &[Role], expected: usize) -> Self {
@@ -190,10 +193,12 @@ impl Gather {
             }
             Light::Intensity => {
                 let most = self.points.iter().fold(f32::NEG_INFINITY, |a, p| a.max(p.amplitude));
-                // Some scanners count from the middle of their range.
+                // Some scanners count from the middle of their range; a little below zero is noise.
                 let least = self.points.iter().fold(0.0, |a: f32, p| a.min(p.amplitude));
+                let least = if least < -SIGNED * most.max(0.0) { least } else { 0.0 };
                 if most > least {
-                    self.points.iter_mut().for_each(|p| p.amplitude = ((p.amplitude - least) / (most - least)).sqrt());
+                    let part = |p: f32| (p - least).max(0.0) / (most - least);
+                    self.points.iter_mut().for_each(|p| p.amplitude = part(p.amplitude).sqrt());
                     let from = if least < 0.0 { format!(" from {least}, which is taken as 0,") } else { String::new() };
                     read.origin = format!("{count} points with intensities{from} up to {most}, which is taken as 1");
                 } else if !self.points.is_empty() {
