@@ -117,6 +117,35 @@ fn directory(file: &mut (impl Read + Seek), length: u64) -> Option<bool> {
     Some(true)
 }
 
+/// Most values of an EXR, all channels together.
+#[cfg(feature = "exr")]
+const MOST_VALUES: u64 = 1 << 28;
+
+/// Whether an EXR of that length [bytes] can hold what its head promises, in pixels and in each of its tiles: its reader makes
+/// room for a whole tile, however large it is said to be. The error is one line without the file's name.
+#[cfg(feature = "exr")]
+pub(crate) fn exr_fits(head: &exr::meta::MetaData, length: u64) -> std::result::Result<(), String> {
+    use exr::meta::BlockDescription;
+    let most = (length.saturating_mul(MOST_OF_A_BYTE)).min(MOST_VALUES);
+    let mut promised = 0u64;
+    for header in &head.headers {
+        let channels = header.channels.list.len() as u64;
+        let values = |[x, y]: [usize; 2]| (x as u64).saturating_mul(y as u64).saturating_mul(channels);
+        promised = promised.saturating_add(values([header.layer_size.x(), header.layer_size.y()]));
+        if let BlockDescription::Tiles(tiles) = &header.blocks {
+            // A tile may be larger than a small picture.
+            let tile = values([tiles.tile_size.x(), tiles.tile_size.y()]);
+            if tile > most.max(FREE / 8) {
+                return Err(format!("has tiles of {tile} values: damaged?"));
+            }
+        }
+    }
+    if promised > most {
+        return Err(format!("promises {promised} values, and has {length} bytes: damaged?"));
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

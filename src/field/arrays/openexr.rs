@@ -2,17 +2,12 @@
 
 use super::{Array, Values, choose, sides};
 use crate::error::{Error, Result};
+use crate::files::pictures::exr_fits;
 use exr::meta::MetaData;
 use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
-
-/// Most values of a file, all channels together.
-const MOST: usize = 1 << 28;
-
-/// Most values that a byte of the file may unfold to: its packings make at most about a thousand bytes of one.
-const MOST_OF_A_BYTE: usize = 1100;
 
 /// Channels that are depths where a file has others, too; without a layer's name and in small letters.
 const DEPTHS: [&str; 3] = ["z", "depth", "distance"];
@@ -26,13 +21,7 @@ pub(super) fn read(path: &Path, name: Option<&str>) -> Result<Array> {
     let open = || File::open(path).map_err(Error::io(path)).map(BufReader::new);
     let length = std::fs::metadata(path).map_err(Error::io(path))?.len();
     let head = MetaData::read_from_buffered(open()?, false).map_err(refused)?;
-    let promised = head.headers.iter().fold(0usize, |sum, header| {
-        let pixels = header.layer_size.x().saturating_mul(header.layer_size.y());
-        sum.saturating_add(pixels.saturating_mul(header.channels.list.len()))
-    });
-    if promised > MOST || promised as u64 > length.saturating_mul(MOST_OF_A_BYTE as u64) {
-        return Err(Error::input(path, format!("promises {promised} values, and has {length} bytes: damaged?")));
-    }
+    exr_fits(&head, length).map_err(|why| Error::input(path, why))?;
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()

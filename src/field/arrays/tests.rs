@@ -372,6 +372,12 @@ fn renderers_depths_are_found_among_the_channels_of_an_exr() {
     }
     write(&["R", "id"], Encoding::UNCOMPRESSED);
     assert!(read(&path).expect_err("two").to_string().contains("name one"));
+    write(&["Z"], Encoding::FAST_LOSSLESS);
+    let mut tiled = std::fs::read(&path).expect("bytes");
+    let at = tiled.windows(9).position(|w| w == b"tiledesc\0").expect("tiles") + 13;
+    tiled[at..at + 8].copy_from_slice(&[0, 1, 0, 1, 0, 1, 0, 0]);
+    assert!(read(&folder.file("a.exr", &tiled)).expect_err("tiles").to_string().contains("tiles of"));
+    write(&["R", "id"], Encoding::UNCOMPRESSED);
     let whole = std::fs::read(&path).expect("bytes");
     for cut in (0..whole.len() - 1).step_by(3) {
         assert!(read(&folder.file("a.exr", &whole[..cut])).is_err(), "{cut}");
