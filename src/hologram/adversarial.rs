@@ -110,7 +110,7 @@ fn no_bound_breaks_on_clouds_that_are_made_for_it() {
 }
 
 #[test]
-#[ignore = "for hours, by hand: cargo test adversarial -- --ignored"]
+#[ignore = "for hours, by hand: cargo test adversarial -- --ignored; of 250 `fine` clouds 5 pass what planes state, by up to 1.4 times"]
 fn no_bound_breaks_on_thousands_of_clouds() {
     let seeds = std::env::var("SEEDS").ok().and_then(|seeds| seeds.parse().ok()).unwrap_or(250);
     kept(&FAMILIES, 2..2 + seeds);
