@@ -11,12 +11,14 @@ use glam::DVec3;
 /// A panel's pitch [m] and wavelength [m], and a cloud before it.
 struct Case {
     family: &'static str,
+    size: [usize; 2],
     pitch: f64,
     wavelength: f64,
     points: Vec<PointSource>,
 }
 
-const SIDE: [usize; 2] = [33, 25];
+/// Columns and rows, by turns; the first is that of most clouds.
+const SIZES: [[usize; 2]; 7] = [[33, 25], [129, 127], [64, 64], [1, 300], [65, 1], [123, 257], [640, 480]];
 
 fn case(family: &'static str, seed: u64) -> Case {
     let mut random = Random::new(seed, 77);
@@ -24,7 +26,8 @@ fn case(family: &'static str, seed: u64) -> Case {
     let fine = family == "fine" || family == "wide";
     let pitch = if fine { between(0.3e-6, 1e-6) } else { between(2e-6, 10e-6) };
     let wavelength = between(450e-9, 1550e-9);
-    let [width, height] = SIDE.map(|side| side as f64 * pitch);
+    let size = SIZES[if seed % 4 == 3 { (seed / 4) as usize % SIZES.len() } else { 0 }];
+    let [width, height] = size.map(|side| side as f64 * pitch);
     let sine = (0.5 * wavelength / pitch).min(0.6);
     let count = match family {
         "crowd" => 120,
@@ -62,7 +65,7 @@ fn case(family: &'static str, seed: u64) -> Case {
             points[last] = PointSource { position, phase: before.phase + std::f64::consts::PI, ..before };
         }
     }
-    Case { family, pitch, wavelength, points }
+    Case { family, size, pitch, wavelength, points }
 }
 
 const FAMILIES: [&str; 9] = ["opposite", "line", "crowd", "micro", "fine", "wide", "grazing", "out of band", "far"];
@@ -70,8 +73,8 @@ const FAMILIES: [&str; 9] = ["opposite", "line", "crowd", "micro", "fine", "wide
 fn kept(families: &[&'static str], seeds: std::ops::Range<u64>) {
     let mut broken = Vec::new();
     for (&family, seed) in families.iter().flat_map(|family| seeds.clone().map(move |seed| (family, seed))) {
-        let Case { family, pitch, wavelength, points } = case(family, seed);
-        let grid = Grid::new(SIDE[0], SIDE[1], pitch, pitch).expect("grid");
+        let Case { family, size, pitch, wavelength, points } = case(family, seed);
+        let grid = Grid::new(size[0], size[1], pitch, pitch).expect("grid");
         let optics = Optics::new(&grid, wavelength).expect("optics");
         let (own, progress) = (sources(&points).expect("sources"), Progress::new());
         let sum = PointSum { optics: &optics, grid: &grid, sources: &own, cull: Cull::Soft, progress: &progress };
@@ -92,7 +95,11 @@ fn kept(families: &[&'static str], seeds: std::ops::Range<u64>) {
             };
             let found = relative_error(&got.field.samples, &exact);
             let (bound, used) = (got.report.error_bound, got.report.method);
-            println!("{family} {seed} {method:?} asked {error:.0e}: {found:.1e}, stated {bound:.1e}, by {used:?}");
+            println!(
+                "{family} {seed} {method:?} {size:?} asked {error:.0e}: {found:.1e}, stated {bound:.1e}, limit {:.1e} of {} \
+                 pixels in {:.1e} s of {:.1e}, by {used:?}",
+                got.report.measured.limit, got.report.measured.pixels, got.report.measured.seconds, got.report.seconds
+            );
             // A field that is dark to f32 is said to be wholly wrong.
             let dark = got.field.samples.iter().all(|u| u.norm_sqr() == 0.0) && bound >= 1.0;
             let told = bound <= error || !got.report.warnings.is_empty();
@@ -110,10 +117,14 @@ fn no_bound_breaks_on_clouds_that_are_made_for_it() {
 }
 
 #[test]
-#[ignore = "for hours, by hand: cargo test adversarial -- --ignored; of 250 `fine` clouds 5 pass what planes state, by up to 1.4 times"]
+#[ignore = "for a quarter of an hour, by hand: cargo test adversarial -- --ignored"]
 fn no_bound_breaks_on_thousands_of_clouds() {
-    let seeds = std::env::var("SEEDS").ok().and_then(|seeds| seeds.parse().ok()).unwrap_or(250);
-    kept(&FAMILIES, 2..2 + seeds);
+    let number = |name: &str, or: u64| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(or);
+    let first = number("FIRST", 2);
+    let chosen = std::env::var("FAMILIES").unwrap_or_else(|_| FAMILIES.join(","));
+    let families: Vec<&str> =
+        FAMILIES.into_iter().filter(|family| chosen.split(',').any(|one| one == *family)).collect();
+    kept(&families, first..first + number("SEEDS", 250));
 }
 
 #[test]
@@ -131,4 +142,34 @@ fn the_exact_sum_is_the_oracle_s_near_and_far() {
         println!("{family}: {error:.1e}");
         assert!(error < whole::ERROR, "{family}: {error:.1e}");
     }
+}
+
+/// The model by itself, without the measurement that mends it.
+#[test]
+#[ignore = "for minutes, by hand: what planes' model says beside what they err by"]
+fn planes_err_by_what_their_model_says() {
+    let mut over = Vec::new();
+    for (family, seed) in ["crowd", "fine", "wide"].iter().flat_map(|family| (0..30).map(move |s| (*family, s))) {
+        for size in [[129, 127], [640, 480]] {
+            let Case { family, pitch, wavelength, points, .. } = case(family, seed);
+            let grid = Grid::new(size[0], size[1], pitch, pitch).expect("grid");
+            let optics = Optics::new(&grid, wavelength).expect("optics");
+            let (own, progress) = (sources(&points).expect("sources"), Progress::new());
+            let sum = PointSum { optics: &optics, grid: &grid, sources: &own, cull: Cull::Soft, progress: &progress };
+            let exact = whole::field(&sum).expect("exact");
+            let cloud = planes::Cloud::new(&optics, &grid, &own);
+            for asked in [1e-3, 1e-2] {
+                let Some(chosen) = planes::Parameters::choose(&cloud, asked, 1 << 30) else { continue };
+                let set = lanes::InstructionSet::detect();
+                let got = planes::field(&cloud, &chosen.parameters, set, &progress).expect("field");
+                let ratio = relative_error(&got.samples, &exact.samples) / chosen.error;
+                let sine = 0.5 * wavelength / pitch;
+                println!("M {ratio:.2} {family} {seed} {size:?} {asked:.0e} sine {sine:.2} {:?}", chosen.parameters);
+                if ratio > 1.0 {
+                    over.push(format!("{family} {seed} {size:?} {asked:.0e}: {ratio:.2}"));
+                }
+            }
+        }
+    }
+    assert!(over.is_empty(), "{over:#?}");
 }

@@ -157,7 +157,7 @@ fn erfc_with(z: Complex64, gauss: Complex64) -> Complex64 {
     if z.re < 0.0 {
         return 2.0 - erfc_with(-z, gauss);
     }
-    let (scale, terms) = series();
+    let Weideman { scale, terms } = series();
     let outer = (z + scale).inv();
     let ratio = (scale - z) * outer;
     let mut sum = Complex64::default();
@@ -167,24 +167,21 @@ fn erfc_with(z: Complex64, gauss: Complex64) -> Complex64 {
     gauss * outer * (2.0 * outer * sum + 1.0 / PI.sqrt())
 }
 
-/// Terms of the rational series of w.
-pub(super) const TERMS: usize = 40;
-
 /// The scale L and the terms of the rational series of w.
-pub(super) fn series() -> (f64, &'static [f64; TERMS]) {
-    static SERIES: LazyLock<Weideman> = LazyLock::new(Weideman::new);
-    (SERIES.scale, &SERIES.terms)
+fn series() -> &'static Weideman<40> {
+    static SERIES: LazyLock<Weideman<40>> = LazyLock::new(Weideman::new);
+    &SERIES
 }
 
 /// The rational series of w: its scale L and its terms aₙ.
-struct Weideman {
-    scale: f64,
-    terms: [f64; TERMS],
+pub(super) struct Weideman<const TERMS: usize> {
+    pub(super) scale: f64,
+    pub(super) terms: [f64; TERMS],
 }
 
-impl Weideman {
+impl<const TERMS: usize> Weideman<TERMS> {
     /// aₙ are the cosine coefficients of (L² + t²)·e^{−t²} over θ, t = L·tan(θ/2), by the trapezoidal rule.
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         let scale = (TERMS as f64 / 2f64.sqrt()).sqrt();
         let samples = 4 * TERMS;
         let sampled = |k: usize| {

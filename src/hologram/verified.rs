@@ -1,6 +1,6 @@
 //! Computing as planned, measuring the error, and doing it again where it is not the one that was asked.
 
-use super::check::{Measured, measure, whole};
+use super::check::{Measured, Wanted, measure, whole};
 use super::definition::Optics;
 use super::exact::{DIRECT_ERROR, Division, GPU_ROUNDING};
 use super::planner::{Engine, ORACLE_ERROR};
@@ -30,8 +30,8 @@ const USELESS: f64 = 0.5;
 ///
 /// The error is measured afterwards ([`Measured`] says how, and relative to what). Where it passes what was asked, the field
 /// is computed again: by the same engine for a smaller error, then by `direct`, then exactly in double precision, as far as their predicted
-/// times are borne. The bound that the report states is never below the measured limit; where it stays above what was asked,
-/// a warning says the numbers.
+/// times are borne. The bound that the report states is never below the measured limit, and is that where all pixels were
+/// measured; where it stays above what was asked, a warning says the numbers.
 ///
 /// # Errors
 /// Those of [`plan`]; [`Error::Parameter`] with the numbers where no engine gets below an error of a half;
@@ -60,11 +60,14 @@ pub fn compute(
         let core_seconds = now.seconds * threads;
         // What is known to be out of an engine's reach is no reason to try another, unless it is far out.
         let target = if bound <= asked { asked } else { asked.max(bound.min(2.0 * DIRECT_ERROR)) };
-        let mut measured = measure(&sum, &field.samples, core_seconds, false)?;
-        if measured.limit > target && measured.error <= 1.5 * target {
-            measured = measure(&sum, &field.samples, core_seconds, true)?;
+        let wanted = Wanted { core_seconds, error: asked, thorough: false };
+        let mut measured = measure(&sum, &field.samples, wanted)?;
+        if !measured.whole && measured.limit > target && measured.error <= 1.5 * target {
+            measured = measure(&sum, &field.samples, Wanted { thorough: true, ..wanted })?;
         }
         tries.push((now.method, measured.limit));
+        // An error that is known is not held against the model's.
+        let bound = if measured.whole { measured.limit } else { bound };
         let kept = measured.limit <= target;
         if best.as_ref().is_none_or(|(.., before)| measured.limit < before.limit) {
             best = Some((field, now.clone(), bound, measured));

@@ -11,39 +11,46 @@
 //! Of n pixels half are drawn evenly and half with the light that was found, both without regard to the engine: with the
 //! density p = ½/N + ½|v|²/Σ|v|² the mean of |u − v|²/p is ‖u − v‖² whatever the field is, a ghost where nothing should be
 //! shows by the even half and a wrong value where the light is by the other. ‖u‖² = Σ|v|² + mean((|u|² − |v|²)/p). The
-//! *limit* is what the error passes in one of a hundred measurements if its squares are even about their mean: 2.33 of the
-//! mean's standard errors above it. n follows from a time: [`SHARE`] of what the field takes, [`FEWEST`] to [`MOST`] pixels;
-//! a grid of no more pixels is measured whole.
+//! *limit* is what the error passes in about one of a hundred measurements: Student's quantile for n pixels, with Johnson's
+//! term for squares that are skew (J. Am. Stat. Assoc. 73 (1978) 536). n follows from a time: [`SHARE`] of what the field
+//! takes, [`FEWEST`] to [`MOST`] pixels. A grid of no more pixels is measured whole, and so is one whose whole exact sum takes
+//! no longer than the pixels would: near points cost little more for all pixels than for a few.
 
 mod near;
+mod real;
 mod waves;
 pub(super) mod whole;
 
 use super::sources::{PointSum, PointWave};
 use crate::error::Result;
 use crate::field::{Complex32, Complex64, Grid};
+use crate::hologram::Cull;
 use crate::random::Random;
 use near::Near;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::time::Instant;
-use waves::Waves;
+use waves::{BATCH, QUICK, Waves};
 
 /// Part of the field's time that the measurement may take.
 const SHARE: f64 = 0.04;
 
-/// Least time that it may take, whatever the field's [core-seconds].
-const LEAST: f64 = 2e-4;
+/// Least time that it may take, whatever the field's [core-seconds]: nobody waits for it.
+const LEAST: f64 = 5e-3;
 
 /// Pixels at least, and at most.
 const FEWEST: usize = 16;
 const MOST: usize = 512;
 
-/// Time of a far point and a pixel [core-seconds].
-const PAIR: f64 = 6e-9;
+/// Time of a far point and a pixel, in double precision and quickly [core-seconds].
+const PAIR: f64 = 1.1e-8;
+const QUICK_PAIR: f64 = 5e-9;
 
-/// Standard errors above the mean that one measurement of a hundred passes.
-const CONFIDENCE: f64 = 2.33;
+/// Part of the error asked that the quick sum may err by.
+const QUICK_SHARE: f64 = 0.01;
+
+/// The normal distribution's quantile that one measurement of a hundred passes.
+const CONFIDENCE: f64 = 2.326;
 
 /// Error of the exact sum, over the points' power: of paths of a million wavelengths in double precision, and of what lies
 /// beyond the taper's end.
@@ -52,8 +59,9 @@ const ROUNDING: f64 = 1e-9;
 /// Seed of the pixels.
 const SEED: u64 = 0x05ee_d0ff_1e1d;
 
-/// Points that one task sums.
-const PART: usize = 2048;
+/// Most parts that the points are summed in, and places of a task.
+const PARTS: usize = 256;
+const PLACES: usize = 64;
 
 /// The error of a field, measured at random pixels against the definition.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,6 +73,8 @@ pub struct Measured {
     pub limit: f64,
     /// Pixels that were computed exactly.
     pub pixels: usize,
+    /// All of the panel's: the error is known, not estimated.
+    pub whole: bool,
     /// ‖u − v‖ over what bare spheres of random phases would have on the panel.
     pub of_power: f64,
     /// Wall time of the measurement [s].
@@ -73,8 +83,14 @@ pub struct Measured {
 
 impl Measured {
     /// A field that holds what is no number.
-    const NOT_FINITE: Self =
-        Self { error: f64::INFINITY, limit: f64::INFINITY, pixels: 0, of_power: f64::INFINITY, seconds: 0.0 };
+    const NOT_FINITE: Self = Self {
+        error: f64::INFINITY,
+        limit: f64::INFINITY,
+        pixels: 0,
+        whole: false,
+        of_power: f64::INFINITY,
+        seconds: 0.0,
+    };
 
     /// The worse of two.
     pub(super) fn or_worse(self, other: Self) -> Self {
@@ -83,8 +99,19 @@ impl Measured {
     }
 }
 
-/// Measures the error of a field that took `core_seconds`; `thorough` with eight times the pixels.
-pub(super) fn measure(sum: &PointSum, field: &[Complex32], core_seconds: f64, thorough: bool) -> Result<Measured> {
+/// What a measurement is made for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wanted {
+    /// What the field took [core-seconds].
+    pub(super) core_seconds: f64,
+    /// Error that was asked.
+    pub(super) error: f64,
+    /// Eight times the pixels.
+    pub(super) thorough: bool,
+}
+
+/// Measures the error of a field.
+pub(super) fn measure(sum: &PointSum, field: &[Complex32], wanted: Wanted) -> Result<Measured> {
     let start = Instant::now();
     let grid = sum.grid;
     let row = |row: &[Complex32]| row.iter().map(|u| f64::from(u.re).powi(2) + f64::from(u.im).powi(2)).sum();
@@ -95,16 +122,21 @@ pub(super) fn measure(sum: &PointSum, field: &[Complex32], core_seconds: f64, th
         return Ok(Measured::NOT_FINITE);
     }
     let exact = Exact::new(sum);
+    let Wanted { core_seconds, error, thorough } = wanted;
+    let is_quick = found > 0.0 && QUICK * (exact.power / found).sqrt() <= QUICK_SHARE * error;
+    let pixel = exact.core_seconds(if is_quick { QUICK_PAIR } else { PAIR });
     let budget = (SHARE * core_seconds).max(LEAST) * if thorough { 8.0 } else { 1.0 };
     let fewest = if thorough { 8 * FEWEST } else { FEWEST };
-    let count = ((budget / exact.core_seconds()) as usize).clamp(fewest, MOST.max(fewest));
+    let count = ((budget / pixel) as usize).clamp(fewest, MOST.max(fewest));
     let even = 1.0 / grid.len() as f64;
-    let (pixels, whole) = if grid.len() <= count {
-        ((0..grid.len()).collect(), true)
+    let whole = grid.len() <= count || whole::seconds(sum, &exact) <= budget.max(count as f64 * pixel);
+    let (pixels, values) = if whole {
+        ((0..grid.len()).collect(), whole::samples(sum, &exact, || ())?)
     } else {
-        (draw(field, &rows, grid, count, thorough), false)
+        let pixels = draw(field, &rows, grid, count, thorough);
+        let values = exact.at(sum, &pixels, is_quick)?;
+        (pixels, values)
     };
-    let values = exact.at(sum, &pixels)?;
     let density = |i: usize| {
         let light = f64::from(field[i].re).powi(2) + f64::from(field[i].im).powi(2);
         if whole {
@@ -116,29 +148,52 @@ pub(super) fn measure(sum: &PointSum, field: &[Complex32], core_seconds: f64, th
         }
     };
     let n = pixels.len() as f64;
-    let (mut mean, mut square, mut more) = (0.0, 0.0, 0.0);
+    let mut errors = Vec::with_capacity(pixels.len());
+    let mut more = 0.0;
     for (&i, exact) in pixels.iter().zip(&values) {
         let v = Complex64::new(f64::from(field[i].re), f64::from(field[i].im));
         let weight = 1.0 / density(i);
-        let error = (exact - v).norm_sqr() * weight;
-        (mean, square) = (mean + error / n, square + error * error / n);
+        errors.push((exact - v).norm_sqr() * weight);
         more += (exact.norm_sqr() - v.norm_sqr()) * weight / n;
     }
+    let mean = errors.iter().sum::<f64>() / n;
     // Exactly dark although points shine: the smallest light that they could send there would be all wrong.
     let is_dark = found == 0.0 && exact.power > 0.0;
     let lit = (found + more).max(f64::from(f32::MIN_POSITIVE).powi(2));
-    let spread = if whole { 0.0 } else { ((square - mean * mean).max(0.0) / (n - 1.0).max(1.0)).sqrt() };
+    let most = if whole { mean } else { upper_limit(&errors, mean) };
     let relative = |square: f64| if square > 0.0 { (square / lit).sqrt() } else { 0.0 };
     let power = exact.power;
     // What the exact sum itself is off by, beside a field that is little of its points' power.
-    let rounding = if power > 0.0 { ROUNDING * (power / lit).sqrt() } else { 0.0 };
+    let accuracy = if is_quick && !whole { QUICK } else { ROUNDING };
+    let rounding = if power > 0.0 { (accuracy + exact.form) * (power / lit).sqrt() } else { 0.0 };
     Ok(Measured {
         error: if is_dark { 1.0 } else { relative(mean) },
-        limit: if is_dark { 1.0 } else { relative(mean + CONFIDENCE * spread) + rounding },
+        limit: if is_dark { 1.0 } else { relative(most) + rounding },
         pixels: pixels.len(),
+        whole,
         of_power: if power > 0.0 { (mean / power).sqrt() } else { 0.0 },
         seconds: start.elapsed().as_secs_f64(),
     })
+}
+
+/// What the mean that values are drawn about passes with a probability of about 1 %: the larger of Student's quantile above
+/// theirs with Johnson's term of their skewness, and of what their mean must be below were they squares of a complex Gaussian
+/// error, whose skewness a few of them do not show.
+fn upper_limit(values: &[f64], mean: f64) -> f64 {
+    let n = values.len() as f64;
+    let moment = |power: i32| values.iter().map(|value| (value - mean).powi(power)).sum::<f64>();
+    let (variance, third) = (moment(2) / (n - 1.0).max(1.0), moment(3) / n);
+    if variance <= 0.0 {
+        return mean;
+    }
+    let (z, free) = (CONFIDENCE, (n - 1.0).max(1.0));
+    // Cornish and Fisher's expansion, to 1 % from eight values on.
+    let student =
+        z + (z.powi(3) + z) / (4.0 * free) + (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * free * free);
+    let skew = third.max(0.0) * (1.0 + 2.0 * student * student) / (6.0 * variance * n);
+    // Wilson and Hilferty's quantile of the sum of n exponential values.
+    let gaussian = 1.0 / (1.0 - 1.0 / (9.0 * n) - z / (9.0 * n).sqrt()).powi(3);
+    (mean + student * (variance / n).sqrt() + skew).max(mean * gaussian)
 }
 
 /// Draws pixels: the even ones first, those that go with the light found; `rows` is the light of each row.
@@ -177,6 +232,8 @@ struct Exact<'a> {
     power: f64,
     /// Work of the near points for one pixel [core-seconds].
     near_seconds: f64,
+    /// Error of the far form of the nearest point that it stands for, and of the near ones' expansion.
+    form: f64,
 }
 
 impl<'a> Exact<'a> {
@@ -196,18 +253,21 @@ impl<'a> Exact<'a> {
             let square = dx * dx + dy * dy + s.distance * s.distance;
             s.amplitude * s.amplitude * (grid.len() as f64 / square.max(1e-30)).min(whole)
         };
-        let parts: Vec<f64> = sources.par_chunks(PART).map(|part| part.iter().map(one).sum()).collect();
+        let parts: Vec<f64> = sources.par_chunks(2048).map(|part| part.iter().map(one).sum()).collect();
         let near_seconds = near.iter().map(|s| Near::core_seconds(optics, grid, s)).sum();
-        Self { far, near, power: parts.iter().sum(), near_seconds }
+        let nearest = far.iter().map(|s| s.distance).fold(f64::INFINITY, f64::min);
+        let of_far = if cull == Cull::Soft { optics.far_error(nearest) } else { 0.0 };
+        let form = if near.is_empty() { of_far } else { of_far.max(near::ACCURACY) };
+        Self { far, near, power: parts.iter().sum(), near_seconds, form }
     }
 
-    /// Work for one pixel [core-seconds].
-    fn core_seconds(&self) -> f64 {
-        (self.far.len() as f64 * PAIR + self.near_seconds).max(1e-12)
+    /// Work for one pixel where a far point takes `pair` [core-seconds].
+    fn core_seconds(&self, pair: f64) -> f64 {
+        (self.far.len() as f64 * pair + self.near_seconds).max(1e-12)
     }
 
     /// The exact field at pixels, in their order.
-    fn at(&self, sum: &PointSum, pixels: &[usize]) -> Result<Vec<Complex64>> {
+    fn at(&self, sum: &PointSum, pixels: &[usize], is_quick: bool) -> Result<Vec<Complex64>> {
         let PointSum { optics, grid, cull, progress, .. } = *sum;
         let places: Vec<[f64; 2]> = pixels.iter().map(|i| [grid.x(i % grid.width), grid.y(i / grid.width)]).collect();
         let waves = Waves::new(optics, cull);
@@ -220,24 +280,31 @@ impl<'a> Exact<'a> {
                 sums
             })
             .collect();
-        let parts: Vec<&[PointWave]> = self.far.chunks(PART).collect();
-        let tasks: Vec<(usize, &[PointWave])> =
-            (0..places.len()).flat_map(|pixel| parts.iter().map(move |part| (pixel, *part))).collect();
-        let far: Vec<Complex64> = tasks
-            .par_iter()
-            .map(
-                |&(pixel, part)| {
-                    if progress.stopped() { Complex64::default() } else { waves.sum(part, places[pixel]) }
-                },
-            )
+        // The same parts for any number of threads.
+        let part = self.far.len().div_ceil(PARTS).max(1).next_multiple_of(BATCH);
+        let tasks: Vec<(usize, &[PointWave])> = self
+            .far
+            .chunks(part)
+            .flat_map(|points| (0..places.len()).step_by(PLACES).map(move |first| (first, points)))
             .collect();
+        let one = |&(first, points): &(usize, &[PointWave])| {
+            let places = &places[first..places.len().min(first + PLACES)];
+            let mut sums = vec![Complex64::default(); places.len()];
+            for batch in points.chunks(BATCH).take_while(|_| !progress.stopped()) {
+                if is_quick {
+                    waves.add_quickly(batch, places, &mut sums);
+                } else {
+                    waves.add(batch, places, &mut sums);
+                }
+            }
+            sums
+        };
+        let far: Vec<Vec<Complex64>> = tasks.par_iter().map(one).collect();
         progress.check()?;
         let mut sums = vec![Complex64::default(); places.len()];
-        for ((pixel, _), value) in tasks.iter().zip(&far) {
-            sums[*pixel] += value;
-        }
-        for part in &near {
-            sums.iter_mut().zip(part).for_each(|(sum, value)| *sum += value);
+        let far = tasks.iter().zip(&far).map(|((first, _), part)| (*first, part));
+        for (first, part) in far.chain(near.iter().map(|part| (0, part))) {
+            sums[first..].iter_mut().zip(part).for_each(|(sum, value)| *sum += value);
         }
         Ok(sums)
     }

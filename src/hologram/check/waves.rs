@@ -1,21 +1,25 @@
-//! Far points at one pixel: the definition's far form with its cross term, eight points at a time in double precision.
+//! Far points at single places: the definition's far form with its cross term, many points at a time.
 //!
-//! Plain loops over eight values, compiled for the instruction sets there are; all give the oracle's values to 1e-10.
+//! Plain loops, compiled to vectors of the instruction sets there are. Paths are in double precision. Taper and wave are too
+//! in [`Waves::add`], which gives the oracle's values to 1e-10, and in single precision in [`Waves::add_quickly`], which gives
+//! them to [`QUICK`] of the points' power and is what a measurement needs.
 
+use super::real::{Real, exp_minus, fused, least, most, product, round, turned};
 use crate::field::Complex64;
 use crate::hologram::Cull;
-use crate::hologram::definition::{Optics, TERMS, series};
+use crate::hologram::definition::{Optics, Weideman};
 use crate::hologram::sources::PointWave;
 use std::f64::consts::{PI, TAU};
+use std::sync::LazyLock;
 
-/// Points that are computed together.
-const LANES: usize = 8;
+/// Points of a batch: as columns they stay in the nearest cache.
+pub(super) const BATCH: usize = 512;
 
-/// A value for each of them.
-type Lanes = [f64; LANES];
+/// Points of a block, which is left out where it is dark, and whose edge is where it is flat: a whole number of vectors.
+const BLOCK: usize = 16;
 
-/// v² over 1 + q² from which on the taper is flat: e^{−40} = 4e-18.
-const FLAT: f64 = 40.0;
+/// Error of the quick sum over the points' power.
+pub(super) const QUICK: f64 = 5e-7;
 
 /// What is the same for all points.
 pub(super) struct Waves {
@@ -33,11 +37,35 @@ pub(super) struct Waves {
     width: [f64; 2],
 }
 
-/// Complex values.
-#[derive(Clone, Copy)]
-struct Pair {
-    re: Lanes,
-    im: Lanes,
+/// Points by columns, filled up with dark ones.
+struct Batch {
+    count: usize,
+    x: [f64; BATCH],
+    y: [f64; BATCH],
+    distance: [f64; BATCH],
+    sign: [f64; BATCH],
+    amplitude: [f64; BATCH],
+    turns: [f64; BATCH],
+}
+
+impl Batch {
+    fn new(points: &[PointWave]) -> Self {
+        let none = [0.0; BATCH];
+        let mut batch = Self {
+            count: points.len(),
+            x: [points.first().map_or(0.0, |p| p.x); BATCH],
+            y: [points.first().map_or(0.0, |p| p.y); BATCH],
+            distance: [1.0; BATCH],
+            sign: [1.0; BATCH],
+            amplitude: none,
+            turns: none,
+        };
+        for (i, p) in points.iter().enumerate() {
+            (batch.x[i], batch.y[i], batch.distance[i]) = (p.x, p.y, p.distance);
+            (batch.sign[i], batch.amplitude[i], batch.turns[i]) = (p.sign, p.amplitude, p.turns);
+        }
+        batch
+    }
 }
 
 impl Waves {
@@ -56,232 +84,263 @@ impl Waves {
         }
     }
 
-    /// The field of points at one place [m].
-    pub(super) fn sum(&self, points: &[PointWave], at: [f64; 2]) -> Complex64 {
+    /// Adds the field of at most [`BATCH`] points at places [m] to their sums, in double precision.
+    pub(super) fn add(&self, points: &[PointWave], places: &[[f64; 2]], sums: &mut [Complex64]) {
+        // To 8e-11 where |arg z| ≤ π/4.
+        static SERIES: LazyLock<Weideman<24>> = LazyLock::new(Weideman::new);
+        self.dispatch(&Batch::new(points), &Series { scale: SERIES.scale, terms: SERIES.terms }, places, sums);
+    }
+
+    /// As [`Waves::add`], taper and wave in single precision.
+    pub(super) fn add_quickly(&self, points: &[PointWave], places: &[[f64; 2]], sums: &mut [Complex64]) {
+        // To 2.3e-7.
+        static SERIES: LazyLock<Weideman<14>> = LazyLock::new(Weideman::new);
+        let series = Series { scale: SERIES.scale as f32, terms: SERIES.terms.map(|term| term as f32) };
+        self.dispatch(&Batch::new(points), &series, places, sums);
+    }
+
+    fn dispatch<T: Real, const N: usize>(
+        &self,
+        batch: &Batch,
+        series: &Series<T, N>,
+        places: &[[f64; 2]],
+        sums: &mut [Complex64],
+    ) {
         #[cfg(target_arch = "x86_64")]
         {
             let fma = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
-            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") && fma {
+            let wide = is_x86_feature_detected!("avx512dq") && is_x86_feature_detected!("avx512vl");
+            if is_x86_feature_detected!("avx512f") && wide && fma {
                 // SAFETY: the features were detected.
-                return unsafe { sum_avx512(self, points, at) };
+                return unsafe { avx512(self, batch, series, places, sums) };
             }
             if fma {
                 // SAFETY: the features were detected.
-                return unsafe { sum_avx2(self, points, at) };
+                return unsafe { avx2(self, batch, series, places, sums) };
             }
         }
-        sum(self, points, at)
+        add::<T, N, false>(self, batch, series, places, sums);
     }
 }
 
-/// exp(i2πt) of turns of any size.
-pub(super) fn cis(turns: &[f64]) -> Vec<Complex64> {
-    let mut out = vec![Complex64::default(); turns.len()];
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-        // SAFETY: the features were detected.
-        unsafe { cis_avx2(turns, &mut out) };
-        return out;
-    }
-    cis_into(turns, &mut out);
-    out
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn cis_avx2(turns: &[f64], out: &mut [Complex64]) {
-    cis_into(turns, out);
-}
-
-#[inline(always)]
-fn cis_into(turns: &[f64], out: &mut [Complex64]) {
-    for (turns, out) in turns.chunks(LANES).zip(out.chunks_mut(LANES)) {
-        let t = each(|i| turns.get(i).map_or(0.0, |t| t - t.round()));
-        let waves = turned(t);
-        out.iter_mut().enumerate().for_each(|(i, out)| *out = Complex64::new(waves.re[i], waves.im[i]));
-    }
+/// The error function's rational series.
+struct Series<T, const N: usize> {
+    scale: T,
+    terms: [T; N],
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
-unsafe fn sum_avx512(waves: &Waves, points: &[PointWave], at: [f64; 2]) -> Complex64 {
-    sum(waves, points, at)
+unsafe fn avx512<T: Real, const N: usize>(
+    waves: &Waves,
+    batch: &Batch,
+    series: &Series<T, N>,
+    places: &[[f64; 2]],
+    sums: &mut [Complex64],
+) {
+    add::<T, N, true>(waves, batch, series, places, sums);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn sum_avx2(waves: &Waves, points: &[PointWave], at: [f64; 2]) -> Complex64 {
-    sum(waves, points, at)
+unsafe fn avx2<T: Real, const N: usize>(
+    waves: &Waves,
+    batch: &Batch,
+    series: &Series<T, N>,
+    places: &[[f64; 2]],
+    sums: &mut [Complex64],
+) {
+    add::<T, N, true>(waves, batch, series, places, sums);
+}
+
+/// A value for each point of a block.
+type Lanes<T> = [T; BLOCK];
+
+/// Complex values of a block.
+struct Pair<T> {
+    re: Lanes<T>,
+    im: Lanes<T>,
+}
+
+impl<T: Real> Pair<T> {
+    const ZERO: Self = Self { re: [T::ZERO; BLOCK], im: [T::ZERO; BLOCK] };
 }
 
 #[inline(always)]
-fn each(f: impl Fn(usize) -> f64) -> Lanes {
-    std::array::from_fn(f)
+fn add<T: Real, const N: usize, const FMA: bool>(
+    waves: &Waves,
+    batch: &Batch,
+    series: &Series<T, N>,
+    places: &[[f64; 2]],
+    sums: &mut [Complex64],
+) {
+    for (at, sum) in places.iter().zip(sums) {
+        let mut total = Pair::<T>::ZERO;
+        for start in (0..batch.count).step_by(BLOCK) {
+            let (x, y) = (&batch.x[start..start + BLOCK], &batch.y[start..start + BLOCK]);
+            let (z, turns) = (&batch.distance[start..start + BLOCK], &batch.turns[start..start + BLOCK]);
+            let (sign, amplitude) = (&batch.sign[start..start + BLOCK], &batch.amplitude[start..start + BLOCK]);
+            let (mut over, mut dx, mut dy) = ([T::ZERO; BLOCK], [T::ZERO; BLOCK], [T::ZERO; BLOCK]);
+            // Turns of the wave: a converging one is the conjugate of a diverging one, the phase φ is not conjugated.
+            let mut phase = [T::ZERO; BLOCK];
+            for i in 0..BLOCK {
+                let (x, y) = (at[0] - x[i], at[1] - y[i]);
+                let r = fused::<f64, FMA>(x, x, fused::<f64, FMA>(y, y, z[i] * z[i])).sqrt();
+                let path = r * waves.inverse;
+                let all = fused::<f64, FMA>(sign[i], path - round(path), turns[i]);
+                (over[i], phase[i]) = (T::ONE / T::of(r), T::of(all - round(all)));
+                (dx[i], dy[i]) = (T::of(x.abs()), T::of(y.abs()));
+            }
+            let mut limited = Pair::<T>::ZERO;
+            match waves.cull {
+                Cull::Soft => {
+                    if !tapered::<T, N, FMA>(waves, [&dx, &dy], &over, series, &mut limited) {
+                        continue;
+                    }
+                }
+                Cull::Hard => {
+                    let inverse = T::of(waves.inverse);
+                    for i in 0..BLOCK {
+                        let (x, y) = ((at[0] - x[i]).abs(), (at[1] - y[i]).abs());
+                        let inside = (x <= waves.cone[0] * z[i]) & (y <= waves.cone[1] * z[i]);
+                        limited.re[i] = if inside { least(over[i], inverse) } else { T::ZERO };
+                    }
+                }
+                Cull::None => {
+                    let inverse = T::of(waves.inverse);
+                    limited.re.iter_mut().zip(&over).for_each(|(limited, over)| *limited = least(*over, inverse));
+                }
+            }
+            for i in 0..BLOCK {
+                let wave = turned::<T, FMA>(phase[i]);
+                let factor = [T::of(amplitude[i]) * limited.re[i], T::of(amplitude[i] * sign[i]) * limited.im[i]];
+                let [re, im] = product::<T, FMA>(factor, wave);
+                (total.re[i], total.im[i]) = (total.re[i] + re, total.im[i] + im);
+            }
+        }
+        let over_lanes = |lanes: &Lanes<T>| lanes.iter().map(|value| value.double()).sum();
+        *sum += Complex64::new(over_lanes(&total.re), over_lanes(&total.im));
+    }
 }
 
-#[inline(always)]
-fn sum(waves: &Waves, points: &[PointWave], at: [f64; 2]) -> Complex64 {
-    let mut total = Pair { re: [0.0; LANES], im: [0.0; LANES] };
-    let dark = PointWave { x: at[0], y: at[1], distance: 1.0, sign: 1.0, amplitude: 0.0, turns: 0.0 };
-    for chunk in points.chunks(LANES) {
-        let p: [PointWave; LANES] = std::array::from_fn(|i| chunk.get(i).copied().unwrap_or(dark));
-        let d = [each(|i| at[0] - p[i].x), each(|i| at[1] - p[i].y)];
-        let r = each(|i| (d[0][i] * d[0][i] + d[1][i] * d[1][i] + p[i].distance * p[i].distance).sqrt());
-        let over = each(|i| 1.0 / r[i]);
-        let limited = match waves.cull {
-            Cull::Soft => {
-                let Some(limited) = tapered(waves, d, over) else { continue };
-                limited
-            }
-            Cull::Hard => {
-                let inside = |i: usize| (0..2).all(|axis| d[axis][i].abs() <= waves.cone[axis] * p[i].distance);
-                let re = each(|i| if inside(i) { over[i].min(waves.inverse) } else { 0.0 });
-                Pair { re, im: [0.0; LANES] }
-            }
-            Cull::None => Pair { re: each(|i| over[i].min(waves.inverse)), im: [0.0; LANES] },
-        };
-        // A converging wave is the conjugate of a diverging one; the phase φ is not conjugated.
-        let turns = each(|i| {
-            let path = r[i] * waves.inverse;
-            let all = p[i].sign * (path - path.round()) + p[i].turns;
-            all - all.round()
-        });
-        let wave = turned(turns);
-        for (i, point) in p.iter().enumerate() {
-            let (a, b) = (point.amplitude * limited.re[i], point.amplitude * point.sign * limited.im[i]);
-            total.re[i] += a * wave.re[i] - b * wave.im[i];
-            total.im[i] += a * wave.im[i] + b * wave.re[i];
+/// One axis of a block's tapers: the sine's modulus, the argument v of the edge and its blur q, how far inside the edge a point
+/// lies, negative where the taper is flat; then the taper and its slope by the sine's modulus.
+struct Axis<T> {
+    sine: Lanes<T>,
+    v: Lanes<T>,
+    q: Lanes<T>,
+    inside: Lanes<T>,
+    taper: Pair<T>,
+    slope: Pair<T>,
+}
+
+impl<T: Real> Axis<T> {
+    #[inline(always)]
+    fn new<const FMA: bool>(waves: &Waves, axis: usize, d: &Lanes<T>, over: &Lanes<T>) -> Self {
+        let [middle, steepness, blur] =
+            [waves.middle[axis], waves.steepness[axis], waves.blur[axis]].map(|value| T::of(value));
+        let none = [T::ZERO; BLOCK];
+        let mut new =
+            Self { sine: none, v: none, q: none, inside: none, taper: Pair::<T>::ZERO, slope: Pair::<T>::ZERO };
+        for i in 0..BLOCK {
+            let sine = d[i] * over[i];
+            let v = (sine - middle) * steepness;
+            let q = (T::ONE - sine * sine) * blur * over[i];
+            (new.sine[i], new.v[i], new.q[i]) = (sine, v, q);
+            new.inside[i] = fused::<T, FMA>(T::FLAT, fused::<T, FMA>(q, q, T::ONE), -(v * v));
+            new.taper.re[i] = if v < T::ZERO { T::ONE } else { T::ZERO };
+        }
+        new
+    }
+
+    /// Adds the edge, where points are in it.
+    #[inline(always)]
+    fn soften<const N: usize, const FMA: bool>(&mut self, width: f64, series: &Series<T, N>) {
+        let by = T::of(-1.0 / (PI.sqrt() * width));
+        for i in 0..BLOCK {
+            let (taper, slope) = edge::<T, N, FMA>(self.v[i], self.q[i], series);
+            let is_edge = self.inside[i] >= T::ZERO;
+            self.taper.re[i] = if is_edge { taper[0] } else { self.taper.re[i] };
+            self.taper.im[i] = if is_edge { taper[1] } else { T::ZERO };
+            self.slope.re[i] = if is_edge { by * slope[0] } else { T::ZERO };
+            self.slope.im[i] = if is_edge { by * slope[1] } else { T::ZERO };
         }
     }
-    Complex64::new(total.re.iter().sum(), total.im.iter().sum())
 }
 
-/// [T·T + i λ f_x f_y/(2πr)·T′·T′]/r; `None` where all of it is dark.
+/// [T·T + i λ f_x f_y/(2πr)·T′·T′]/r; false where all of it is dark.
 #[inline(always)]
-fn tapered(waves: &Waves, d: [Lanes; 2], over: Lanes) -> Option<Pair> {
-    let sine = [0, 1].map(|axis: usize| each(|i| d[axis][i].abs() * over[i]));
-    let v = [0, 1].map(|axis: usize| each(|i| (sine[axis][i] - waves.middle[axis]) * waves.steepness[axis]));
-    let q = [0, 1].map(|axis: usize| each(|i| (1.0 - sine[axis][i] * sine[axis][i]) * waves.blur[axis] * over[i]));
-    let is_edge = |axis: usize, i: usize| v[axis][i] * v[axis][i] <= FLAT * (1.0 + q[axis][i] * q[axis][i]);
-    let (mut lit, mut edges) = (false, [false; 2]);
-    for (i, (&x, &y)) in v[0].iter().zip(&v[1]).enumerate() {
-        let edge = [is_edge(0, i), is_edge(1, i)];
-        let here = (edge[0] || x < 0.0) && (edge[1] || y < 0.0);
-        lit |= here;
-        edges = [edges[0] | (edge[0] & here), edges[1] | (edge[1] & here)];
+fn tapered<T: Real, const N: usize, const FMA: bool>(
+    waves: &Waves,
+    d: [&Lanes<T>; 2],
+    over: &Lanes<T>,
+    series: &Series<T, N>,
+    limited: &mut Pair<T>,
+) -> bool {
+    let mut x = Axis::new::<FMA>(waves, 0, d[0], over);
+    let mut y = Axis::new::<FMA>(waves, 1, d[1], over);
+    let (mut any, mut in_x, mut in_y) = (0u32, 0u32, 0u32);
+    for i in 0..BLOCK {
+        // Not negative where light passes: in the edge of an axis, or on its inner side.
+        let lit = least(most(x.inside[i], -x.v[i]), most(y.inside[i], -y.v[i]));
+        any |= u32::from(lit >= T::ZERO);
+        in_x |= u32::from(least(lit, x.inside[i]) >= T::ZERO);
+        in_y |= u32::from(least(lit, y.inside[i]) >= T::ZERO);
     }
-    if !lit {
-        return None;
+    if any == 0 {
+        return false;
     }
-    let flat = |axis: usize| {
-        let step = Pair { re: each(|i| f64::from(u8::from(v[axis][i] < 0.0))), im: [0.0; LANES] };
-        (step, Pair { re: [0.0; LANES], im: [0.0; LANES] })
-    };
-    let axes = [0, 1].map(|axis: usize| {
-        let (step, none) = flat(axis);
-        if !edges[axis] {
-            return (step, none);
-        }
-        let (t, slope) = edge(v[axis], q[axis], waves.width[axis]);
-        let chosen = |edge: Lanes, flat: Lanes| each(|i| if is_edge(axis, i) { edge[i] } else { flat[i] });
-        let t = Pair { re: chosen(t.re, step.re), im: chosen(t.im, step.im) };
-        (t, Pair { re: chosen(slope.re, none.re), im: chosen(slope.im, none.im) })
-    });
-    let [(tx, ex), (ty, ey)] = axes;
+    if in_x != 0 {
+        x.soften::<N, FMA>(waves.width[0], series);
+    }
+    if in_y != 0 {
+        y.soften::<N, FMA>(waves.width[1], series);
+    }
     // With T′ by the sine instead of the frequency, λ f_x f_y/2πr is λ s_x s_y/2πr.
-    let cross = each(|i| waves.wavelength * sine[0][i] * sine[1][i] * over[i] / TAU);
-    let re = each(|i| {
-        let product = tx.re[i] * ty.re[i] - tx.im[i] * ty.im[i];
-        (product - cross[i] * (ex.re[i] * ey.im[i] + ex.im[i] * ey.re[i])) * over[i]
-    });
-    let im = each(|i| {
-        let product = tx.re[i] * ty.im[i] + tx.im[i] * ty.re[i];
-        (product + cross[i] * (ex.re[i] * ey.re[i] - ex.im[i] * ey.im[i])) * over[i]
-    });
-    Some(Pair { re, im })
+    let by = T::of(waves.wavelength / TAU);
+    for (i, over) in over.iter().enumerate() {
+        let cross = by * x.sine[i] * y.sine[i] * *over;
+        let [re, im] = product::<T, FMA>([x.taper.re[i], x.taper.im[i]], [y.taper.re[i], y.taper.im[i]]);
+        let [slope_re, slope_im] = product::<T, FMA>([x.slope.re[i], x.slope.im[i]], [y.slope.re[i], y.slope.im[i]]);
+        limited.re[i] = (re - cross * slope_im) * *over;
+        limited.im[i] = (im + cross * slope_re) * *over;
+    }
+    true
 }
 
-/// T and its slope by the sine's modulus, of a diverging wave.
+/// T of a diverging wave, and e^{−v²/(1 − iq)}/√(1 − iq), of which its slope is a multiple.
 #[inline(always)]
-fn edge(v: Lanes, q: Lanes, width: f64) -> (Pair, Pair) {
-    let (scale, terms): (f64, &[f64; TERMS]) = series();
-    // 1/√(1 − iq) = (re + iq/2re)/√(1 + q²).
-    let modulus = each(|i| (1.0 + q[i] * q[i]).sqrt());
-    let root = each(|i| (0.5 * (modulus[i] + 1.0)).sqrt());
-    let inverse = Pair { re: each(|i| root[i] / modulus[i]), im: each(|i| 0.5 * q[i] / (root[i] * modulus[i])) };
-    let z = Pair { re: each(|i| v[i].abs() * inverse.re[i]), im: each(|i| v[i].abs() * inverse.im[i]) };
-    let fall = each(|i| exp_minus(z.re[i] * z.re[i] - z.im[i] * z.im[i]));
-    let wave = turned(each(|i| {
-        let turns = -2.0 * z.re[i] * z.im[i] / TAU;
-        turns - turns.round()
-    }));
-    let gauss = Pair { re: each(|i| fall[i] * wave.re[i]), im: each(|i| fall[i] * wave.im[i]) };
+fn edge<T: Real, const N: usize, const FMA: bool>(v: T, q: T, series: &Series<T, N>) -> ([T; 2], [T; 2]) {
+    let (half, scale) = (T::of(0.5), series.scale);
+    // 1/√(1 − iq) = (root + iq/(2 root))/√(1 + q²).
+    let modulus = fused::<T, FMA>(q, q, T::ONE).sqrt();
+    let square = half * (modulus + T::ONE);
+    let over = T::ONE / (square.sqrt() * modulus);
+    let inverse = [square * over, half * q * over];
+    let z = [v.abs() * inverse[0], v.abs() * inverse[1]];
+    let fall = exp_minus::<T, FMA>(z[0] * z[0] - z[1] * z[1]);
+    let turns = T::of(-2.0 / TAU) * z[0] * z[1];
+    let [re, im] = turned::<T, FMA>(turns - turns.round());
+    let gauss = [fall * re, fall * im];
     // Weideman's series in Z = (L − z)/(L + z).
-    let norm = each(|i| 1.0 / ((scale + z.re[i]) * (scale + z.re[i]) + z.im[i] * z.im[i]));
-    let outer = Pair { re: each(|i| (scale + z.re[i]) * norm[i]), im: each(|i| -z.im[i] * norm[i]) };
-    let ratio = Pair {
-        re: each(|i| (scale - z.re[i]) * outer.re[i] + z.im[i] * outer.im[i]),
-        im: each(|i| (scale - z.re[i]) * outer.im[i] - z.im[i] * outer.re[i]),
-    };
-    let mut sum = Pair { re: [0.0; LANES], im: [0.0; LANES] };
-    for term in terms.iter().rev() {
-        let re = each(|i| sum.re[i] * ratio.re[i] - sum.im[i] * ratio.im[i] + term);
-        let im = each(|i| sum.re[i] * ratio.im[i] + sum.im[i] * ratio.re[i]);
-        sum = Pair { re, im };
+    let sum = scale + z[0];
+    let norm = T::ONE / fused::<T, FMA>(sum, sum, z[1] * z[1]);
+    let outer = [sum * norm, -z[1] * norm];
+    let ratio = product::<T, FMA>([scale - z[0], -z[1]], outer);
+    let mut all = [T::ZERO; 2];
+    for n in (0..N).rev() {
+        let [re, im] = all;
+        all = [
+            fused::<T, FMA>(re, ratio[0], fused::<T, FMA>(-im, ratio[1], series.terms[n])),
+            fused::<T, FMA>(re, ratio[1], im * ratio[0]),
+        ];
     }
     // erfc(z) = e^{−z²}·outer·(2·outer·sum + 1/√π), and 2 − erfc(−z) on the other side.
-    let inner = Pair {
-        re: each(|i| 2.0 * (outer.re[i] * sum.re[i] - outer.im[i] * sum.im[i]) + 1.0 / PI.sqrt()),
-        im: each(|i| 2.0 * (outer.re[i] * sum.im[i] + outer.im[i] * sum.re[i])),
-    };
-    let series = Pair {
-        re: each(|i| outer.re[i] * inner.re[i] - outer.im[i] * inner.im[i]),
-        im: each(|i| outer.re[i] * inner.im[i] + outer.im[i] * inner.re[i]),
-    };
-    let half = Pair {
-        re: each(|i| 0.5 * (gauss.re[i] * series.re[i] - gauss.im[i] * series.im[i])),
-        im: each(|i| 0.5 * (gauss.re[i] * series.im[i] + gauss.im[i] * series.re[i])),
-    };
-    let t = Pair {
-        re: each(|i| if v[i] < 0.0 { 1.0 - half.re[i] } else { half.re[i] }),
-        im: each(|i| if v[i] < 0.0 { -half.im[i] } else { half.im[i] }),
-    };
-    let by = -1.0 / (width * PI.sqrt());
-    let slope = Pair {
-        re: each(|i| by * (gauss.re[i] * inverse.re[i] - gauss.im[i] * inverse.im[i])),
-        im: each(|i| by * (gauss.re[i] * inverse.im[i] + gauss.im[i] * inverse.re[i])),
-    };
-    (t, slope)
-}
-
-/// e^{−x} for 0 ≤ x ≤ 700.
-#[inline(always)]
-fn exp_minus(x: f64) -> f64 {
-    // 1.5·2⁵²: added, the nearest integer stands in the low bits.
-    const ROUND: f64 = 6_755_399_441_055_744.0;
-    let scaled = -x.clamp(0.0, 700.0) * std::f64::consts::LOG2_E;
-    let shifted = scaled + ROUND;
-    let f = (scaled - (shifted - ROUND)) * std::f64::consts::LN_2;
-    let power = f64::from_bits((shifted.to_bits().wrapping_add(1023)) << 52);
-    let mut sum = 1.0;
-    for n in (1..14u32).rev() {
-        sum = 1.0 + sum * f / f64::from(n);
-    }
-    power * sum
-}
-
-/// exp(i2πt) for |t| ≤ ½ turns: Taylor about the nearest half turn, to x²¹/21! of a quarter turn, 3e-16.
-#[inline(always)]
-fn turned(t: Lanes) -> Pair {
-    let half = each(|i| (2.0 * t[i]).round());
-    let side = each(|i| 1.0 - 2.0 * half[i].abs());
-    let x = each(|i| (t[i] - 0.5 * half[i]) * TAU);
-    let square = each(|i| x[i] * x[i]);
-    let (mut sin, mut cos) = ([1.0; LANES], [1.0; LANES]);
-    for n in (1..=10u32).rev() {
-        let (s, c) = (1.0 / f64::from(2 * n * (2 * n + 1)), 1.0 / f64::from(2 * n * (2 * n - 1)));
-        sin = each(|i| 1.0 - sin[i] * square[i] * s);
-        cos = each(|i| 1.0 - cos[i] * square[i] * c);
-    }
-    Pair { re: each(|i| cos[i] * side[i]), im: each(|i| sin[i] * x[i] * side[i]) }
+    let two = T::of(2.0);
+    let [re, im] = product::<T, FMA>(outer, all);
+    let inner = [fused::<T, FMA>(two, re, T::of(1.0 / PI.sqrt())), two * im];
+    let [re, im] = product::<T, FMA>(gauss, product::<T, FMA>(outer, inner));
+    let (re, im) = (half * re, half * im);
+    let taper = [if v < T::ZERO { T::ONE - re } else { re }, if v < T::ZERO { -im } else { im }];
+    (taper, product::<T, FMA>(gauss, inverse))
 }

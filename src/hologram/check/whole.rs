@@ -4,7 +4,7 @@
 //! stays the obvious form that both are tested against.
 
 use super::near::{Lines, Near};
-use super::waves::Waves;
+use super::waves::{BATCH, Waves};
 use super::{Exact, PAIR};
 use crate::error::Result;
 use crate::field::{Complex64, Field};
@@ -14,15 +14,16 @@ use rayon::prelude::*;
 /// Memory for the lines of near points that are added together [bytes].
 const LINES: usize = 64 << 20;
 
-/// Far points that are summed before the job is asked whether to go on.
-const PART: usize = 1 << 14;
-
 /// Error of the sum: the far form where it stands for the integral, and the expansion of near points.
 pub(in crate::hologram) const ERROR: f64 = 3e-5;
 
 /// Predicted work [core-seconds].
 pub(in crate::hologram) fn core_seconds(sum: &PointSum) -> f64 {
-    let exact = Exact::new(sum);
+    seconds(sum, &Exact::new(sum))
+}
+
+/// The same, of points that were divided.
+pub(super) fn seconds(sum: &PointSum, exact: &Exact) -> f64 {
     let near: f64 = exact.near.iter().map(|s| Near::whole_seconds(sum.optics, sum.grid, s)).sum();
     exact.far.len() as f64 * sum.grid.len() as f64 * PAIR + near
 }
@@ -39,21 +40,24 @@ pub(in crate::hologram) fn memory(sum: &PointSum) -> u64 {
 
 /// The field on the whole grid.
 pub(in crate::hologram) fn field(sum: &PointSum) -> Result<Field> {
-    let PointSum { optics, grid, cull, progress, .. } = *sum;
+    let PointSum { optics, grid, progress, .. } = *sum;
     let exact = Exact::new(sum);
     progress.start("hologram: exact sum", (grid.height + exact.near.len()) as u64);
+    let samples = samples(sum, &exact, || progress.advance(1))?;
+    Ok(Field { grid: *grid, wavelength: optics.wavelength, samples }.to_f32())
+}
+
+/// Its samples in double precision; `advance` is called for each row and each near point.
+pub(super) fn samples(sum: &PointSum, exact: &Exact, advance: impl Fn() + Sync) -> Result<Vec<Complex64>> {
+    let PointSum { optics, grid, cull, progress, .. } = *sum;
     let waves = Waves::new(optics, cull);
-    let mut field = Field::<f64>::zeros(*grid, optics.wavelength);
-    field.samples.par_chunks_mut(grid.width).enumerate().for_each(|(row, samples)| {
-        for (column, u) in samples.iter_mut().enumerate() {
-            for part in exact.far.chunks(PART) {
-                if progress.stopped() {
-                    return;
-                }
-                *u += waves.sum(part, [grid.x(column), grid.y(row)]);
-            }
+    let mut samples = vec![Complex64::default(); grid.len()];
+    samples.par_chunks_mut(grid.width).enumerate().for_each(|(row, samples)| {
+        let places: Vec<[f64; 2]> = (0..grid.width).map(|column| [grid.x(column), grid.y(row)]).collect();
+        for batch in exact.far.chunks(BATCH).take_while(|_| !progress.stopped()) {
+            waves.add(batch, &places, samples);
         }
-        progress.advance(1);
+        advance();
     });
     progress.check()?;
     let mut rest = &exact.near[..];
@@ -67,12 +71,12 @@ pub(in crate::hologram) fn field(sum: &PointSum) -> Result<Field> {
         let one = |s: &_| if progress.stopped() { None } else { Lines::new(optics, grid, s) };
         let lines: Vec<Option<Lines>> = now.par_iter().map(one).collect();
         progress.check()?;
-        field.samples.par_chunks_mut(grid.width).enumerate().for_each(|(row, samples): (usize, &mut [Complex64])| {
+        samples.par_chunks_mut(grid.width).enumerate().for_each(|(row, samples): (usize, &mut [Complex64])| {
             lines.iter().flatten().take_while(|_| !progress.stopped()).for_each(|lines| lines.add_row(row, samples));
         });
         progress.check()?;
-        progress.advance(now.len() as u64);
+        now.iter().for_each(|_| advance());
         rest = later;
     }
-    Ok(field.to_f32())
+    Ok(samples)
 }
