@@ -44,10 +44,10 @@ const MOST: usize = 512;
 
 /// Time of a far point and a pixel, in double precision and quickly [core-seconds].
 const PAIR: f64 = 1.1e-8;
-const QUICK_PAIR: f64 = 5e-9;
+const QUICK_PAIR: f64 = 7e-9;
 
 /// Part of the error asked that the quick sum may err by.
-const QUICK_SHARE: f64 = 0.01;
+const QUICK_SHARE: f64 = 0.02;
 
 /// The normal distribution's quantile that one measurement of a hundred passes.
 const CONFIDENCE: f64 = 2.326;

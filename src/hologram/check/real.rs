@@ -78,9 +78,9 @@ impl Real for f64 {
 impl Real for f32 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
-    const FLAT: Self = 14.0;
-    const WAVE: u32 = 6;
-    const POWER: u32 = 7;
+    const FLAT: Self = 12.0;
+    const WAVE: u32 = 5;
+    const POWER: u32 = 6;
 
     #[inline(always)]
     fn of(value: f64) -> Self {

@@ -19,7 +19,7 @@ pub(super) const BATCH: usize = 512;
 const BLOCK: usize = 16;
 
 /// Error of the quick sum over the points' power.
-pub(super) const QUICK: f64 = 5e-7;
+pub(super) const QUICK: f64 = 5e-6;
 
 /// What is the same for all points.
 pub(super) struct Waves {
@@ -93,8 +93,8 @@ impl Waves {
 
     /// As [`Waves::add`], taper and wave in single precision.
     pub(super) fn add_quickly(&self, points: &[PointWave], places: &[[f64; 2]], sums: &mut [Complex64]) {
-        // To 2.3e-7.
-        static SERIES: LazyLock<Weideman<14>> = LazyLock::new(Weideman::new);
+        // To 4.4e-6.
+        static SERIES: LazyLock<Weideman<12>> = LazyLock::new(Weideman::new);
         let series = Series { scale: SERIES.scale as f32, terms: SERIES.terms.map(|term| term as f32) };
         self.dispatch(&Batch::new(points), &series, places, sums);
     }
