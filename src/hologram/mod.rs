@@ -156,7 +156,7 @@ pub struct HologramReport {
     /// Time that the plan predicted [s].
     pub predicted_seconds: f64,
     /// Bound on the relative L2 error against the definition, relative to the field that is there: the engine's, or the
-    /// measured limit where that is higher.
+    /// measured limit where that is higher or all pixels were measured.
     pub error_bound: f64,
     /// The error that was measured after the field was made.
     pub measured: Measured,

@@ -36,7 +36,7 @@ use waves::{BATCH, QUICK, Waves};
 const SHARE: f64 = 0.04;
 
 /// Least time that it may take, whatever the field's [core-seconds]: nobody waits for it.
-const LEAST: f64 = 5e-3;
+const LEAST: f64 = 2e-2;
 
 /// Pixels at least, and at most.
 const FEWEST: usize = 16;
@@ -55,6 +55,9 @@ const CONFIDENCE: f64 = 2.326;
 /// Error of the exact sum, over the points' power: of paths of a million wavelengths in double precision, and of what lies
 /// beyond the taper's end.
 const ROUNDING: f64 = 1e-9;
+
+/// Rounding of a field's samples.
+const SAMPLES: f64 = 6e-8;
 
 /// Seed of the pixels.
 const SEED: u64 = 0x05ee_d0ff_1e1d;
@@ -165,7 +168,7 @@ pub(super) fn measure(sum: &PointSum, field: &[Complex32], wanted: Wanted) -> Re
     let power = exact.power;
     // What the exact sum itself is off by, beside a field that is little of its points' power.
     let accuracy = if is_quick && !whole { QUICK } else { ROUNDING };
-    let rounding = if power > 0.0 { (accuracy + exact.form) * (power / lit).sqrt() } else { 0.0 };
+    let rounding = if power > 0.0 { (accuracy + exact.form) * (power / lit).sqrt() + SAMPLES } else { 0.0 };
     Ok(Measured {
         error: if is_dark { 1.0 } else { relative(mean) },
         limit: if is_dark { 1.0 } else { relative(most) + rounding },

@@ -23,7 +23,7 @@ const NEAREST_EDGE: f64 = 0.94;
 const MOST: usize = 400;
 
 /// Time of one term [core-seconds].
-const TERM: f64 = 4e-8;
+const TERM: f64 = 1e-8;
 
 pub(super) struct Near;
 
@@ -88,7 +88,7 @@ impl Near {
     pub(super) fn whole_seconds(optics: &Optics, grid: &Grid, source: &PointWave) -> f64 {
         let [columns, rows, rank] = Self::line_sizes(optics, grid, source);
         let [x, y] = [0, 1].map(|axis| Self::lattice(optics, axis, source.distance).1 as f64);
-        (columns * x + rows * y) * (4e-9 + 2e-9 * rank) + rank * (columns * rows * 2e-9 + (x + y) * TERM)
+        (columns * x + rows * y) * (3e-9 + 1e-9 * rank) + rank * (columns * rows * 1.2e-9 + (x + y) * TERM)
     }
 
     /// Expected work for a pixel anywhere [core-seconds].
