@@ -70,7 +70,12 @@ fn case(family: &'static str, seed: u64) -> Case {
 
 const FAMILIES: [&str; 9] = ["opposite", "line", "crowd", "micro", "fine", "wide", "grazing", "out of band", "far"];
 
-fn kept(families: &[&'static str], seeds: std::ops::Range<u64>) {
+/// Every engine but the oracle, which is what the others are measured by.
+const ENGINES: [Method; 6] =
+    [Method::Tiles, Method::Planes, Method::Direct, Method::Recurrence, Method::Gpu, Method::GpuPlanes];
+
+/// The first three engines; with `gpu_every` the fourth, too, and those on a graphics processor for every so many seeds.
+fn kept(families: &[&'static str], seeds: std::ops::Range<u64>, gpu_every: Option<u64>) {
     let mut broken = Vec::new();
     for (&family, seed) in families.iter().flat_map(|family| seeds.clone().map(move |seed| (family, seed))) {
         let Case { family, size, pitch, wavelength, points } = case(family, seed);
@@ -81,7 +86,15 @@ fn kept(families: &[&'static str], seeds: std::ops::Range<u64>) {
         let exact = whole::field(&sum).expect("exact");
         let exact: Vec<_> =
             exact.samples.iter().map(|u| crate::field::Complex64::new(u.re.into(), u.im.into())).collect();
-        for method in [None, Some(Method::Tiles), Some(Method::Planes), Some(Method::Direct)] {
+        let on_gpu = cfg!(feature = "gpu") && gpu_every.is_some_and(|every| seed.is_multiple_of(every));
+        let engines = &ENGINES[..if on_gpu {
+            6
+        } else if gpu_every.is_some() {
+            4
+        } else {
+            3
+        }];
+        for method in std::iter::once(None).chain(engines.iter().copied().map(Some)) {
             let error = [1e-3, 1e-2][seed as usize % 2];
             let settings = HologramSettings { method, error, memory: 256 << 20, ..HologramSettings::default() };
             let Ok(plan) = plan(&points, &grid, wavelength, &settings) else { continue };
@@ -113,7 +126,7 @@ fn kept(families: &[&'static str], seeds: std::ops::Range<u64>) {
 
 #[test]
 fn no_bound_breaks_on_clouds_that_are_made_for_it() {
-    kept(&FAMILIES, 0..2);
+    kept(&FAMILIES, 0..2, None);
 }
 
 #[test]
@@ -124,7 +137,7 @@ fn no_bound_breaks_on_thousands_of_clouds() {
     let chosen = std::env::var("FAMILIES").unwrap_or_else(|_| FAMILIES.join(","));
     let families: Vec<&str> =
         FAMILIES.into_iter().filter(|family| chosen.split(',').any(|one| one == *family)).collect();
-    kept(&families, first..first + number("SEEDS", 250));
+    kept(&families, first..first + number("SEEDS", 250), Some(number("GPU_EVERY", 10)));
 }
 
 #[test]

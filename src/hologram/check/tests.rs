@@ -76,7 +76,7 @@ fn one_mean_of_a_hundred_passes_its_limit() {
 fn an_error_is_measured_wherever_it_is() {
     let grid = Grid::new(200, 150, 8e-6, 8e-6).expect("grid");
     let optics = Optics::new(&grid, 532e-9).expect("optics");
-    let points = cloud(&grid, 40, [0.1, 0.2], 0.9);
+    let points = cloud(&grid, 200, [0.1, 0.2], 0.9);
     let (sources, progress) = (sources(&points).expect("sources"), Progress::new());
     let sum = PointSum { optics: &optics, grid: &grid, sources: &sources, cull: Cull::Soft, progress: &progress };
     let all: Vec<usize> = (0..grid.len()).collect();
