@@ -27,10 +27,11 @@ const HIGHEST_RANK: usize = 32;
 /// Error at which the expansion of G is cut.
 const ACCURACY: f64 = 2e-6;
 
-/// Pixels beyond the cone after which the taper's own tail, exp(−(0.0895·px)²)/(π·px), is dropped: 3e-6.
+/// Pixels beyond the cone after which the taper's own tail, exp(−(0.0895·px)²)/(π·px), is dropped: 3e-6. Of a band that ends at
+/// half a cycle a pixel; of a narrower one by as much more.
 const TAIL: f64 = 34.0;
 
-/// Pixels beyond the cone after which the kernel is zero to 1e-10: the distance to its alias.
+/// Pixels beyond the cone after which the kernel is zero to 1e-10: the distance to its alias; likewise.
 const SILENCE: f64 = 64.0;
 
 /// Points whose kernels are held together.
@@ -57,11 +58,19 @@ pub(crate) fn rank(optics: &Optics, distance: f64) -> Option<usize> {
     None
 }
 
+/// Pixels that a kernel reaches along an axis, `tail` pixels beyond the cone, which the other axis tilts outwards.
+fn reach(optics: &Optics, axis: usize, distance: f64, tail: f64) -> f64 {
+    let [sine, other] = [axis, 1 - axis].map(|axis| (optics.wavelength * optics.taper[axis].limit).powi(2));
+    let cone = distance * (sine / (1.0 - sine - other).max(0.02)).sqrt();
+    let narrow = 2.0 * optics.pitch[axis] * optics.taper[axis].limit;
+    cone / optics.pitch[axis] + tail / narrow
+}
+
 /// Memory of a batch of kernels [bytes].
 pub(crate) fn bytes(optics: &Optics, sources: &[PointWave], indexes: &[usize]) -> u64 {
     let largest = indexes.iter().map(|&i| {
         let distance = sources[i].distance;
-        let span: f64 = (0..2).map(|axis| 2.0 * (optics.cone(axis, distance) / optics.pitch[axis] + TAIL) + 2.0).sum();
+        let span: f64 = (0..2).map(|axis| 2.0 * reach(optics, axis, distance, TAIL) + 2.0).sum();
         rank(optics, distance).unwrap_or(1) as u64 * span as u64 * 8
     });
     largest.max().unwrap_or(0) * BATCH.min(indexes.len()) as u64
@@ -71,10 +80,11 @@ pub(crate) fn bytes(optics: &Optics, sources: &[PointWave], indexes: &[usize]) -
 /// 3,000 points within 6 cm of a panel of 1080p at 8 µm.
 pub(crate) fn core_seconds(optics: &Optics, sources: &[PointWave], indexes: &[usize]) -> f64 {
     let one = |&i: &usize| {
-        let cone = [0, 1].map(|axis| 2.0 * (optics.cone(axis, sources[i].distance) / optics.pitch[axis]));
-        let lines: f64 = cone.iter().map(|c| ((c + 2.0 * SILENCE) as usize + 2).next_power_of_two() as f64).sum();
+        let [columns, rows] = [0, 1].map(|axis| 2.0 * reach(optics, axis, sources[i].distance, TAIL));
+        let period = |axis: usize| (2.0 * reach(optics, axis, sources[i].distance, SILENCE)) as usize + 2;
+        let lines = (period(0).next_power_of_two() + period(1).next_power_of_two()) as f64;
         let rank = rank(optics, sources[i].distance).unwrap_or(HIGHEST_RANK) as f64;
-        rank * (lines * (1.05e-7 + 7e-9 * rank) + (cone[0] + 2.0 * TAIL) * (cone[1] + 2.0 * TAIL) * 1.4e-9)
+        rank * (lines * (1.05e-7 + 7e-9 * rank) + columns * rows * 1.4e-9)
     };
     indexes.iter().map(one).sum()
 }
@@ -140,7 +150,7 @@ impl Kernel {
     fn new(optics: &Optics, source: &PointWave, grid: &Grid, plans: &mut Plans) -> Option<Self> {
         let rank = rank(optics, source.distance).unwrap_or(HIGHEST_RANK);
         let span = |axis: usize, position: f64, count: usize| {
-            let reach = optics.cone(axis, source.distance) / optics.pitch[axis] + TAIL;
+            let reach = reach(optics, axis, source.distance, TAIL);
             let first = (position - reach).ceil().max(0.0);
             let last = (position + reach).floor().min(count as f64 - 1.0);
             (first <= last).then_some(Line { axis, position, first: first as usize, last: last as usize })
@@ -217,7 +227,7 @@ impl Line {
         spectrum: impl Fn(f64) -> Complex64,
     ) -> Vec<Complex64> {
         let (pitch, taper) = (optics.pitch[self.axis], optics.taper[self.axis]);
-        let period = 2.0 * (optics.cone(self.axis, distance) / pitch + SILENCE);
+        let period = 2.0 * reach(optics, self.axis, distance, SILENCE);
         let n = (period as usize + 2).next_power_of_two();
         let step = 1.0 / (n as f64 * pitch);
         let nearest = self.position.floor();
