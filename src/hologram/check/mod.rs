@@ -13,8 +13,8 @@
 //! shows by the even half and a wrong value where the light is by the other. ‖u‖² = Σ|v|² + mean((|u|² − |v|²)/p). The
 //! *limit* is what the error passes in about one of a hundred measurements: Student's quantile for n pixels, with Johnson's
 //! term for squares that are skew (J. Am. Stat. Assoc. 73 (1978) 536). n follows from a time: [`SHARE`] of what the field
-//! takes, [`FEWEST`] to [`MOST`] pixels. A grid of no more pixels is measured whole, and so is one whose whole exact sum takes
-//! no longer than the pixels would: near points cost little more for all pixels than for a few.
+//! takes, [`FEWEST`] to [`MOST`] pixels. A grid of no more pixels is measured whole, and so is a small one whose whole exact sum
+//! takes no longer than the pixels would: near points cost little more for all pixels than for a few.
 
 mod near;
 mod real;
@@ -41,6 +41,10 @@ const LEAST: f64 = 2e-2;
 /// Pixels at least, and at most.
 const FEWEST: usize = 16;
 const MOST: usize = 512;
+
+/// Pixels of a grid that may be measured whole, and memory for near points' lines then [bytes]: a few MB beside the engine's.
+const WHOLE: usize = 1 << 16;
+const LINES: usize = 2 << 20;
 
 /// Time of a far point and a pixel, in double precision and quickly [core-seconds].
 const PAIR: f64 = 1.1e-8;
@@ -132,9 +136,10 @@ pub(super) fn measure(sum: &PointSum, field: &[Complex32], wanted: Wanted) -> Re
     let fewest = if thorough { 8 * FEWEST } else { FEWEST };
     let count = ((budget / pixel) as usize).clamp(fewest, MOST.max(fewest));
     let even = 1.0 / grid.len() as f64;
-    let whole = grid.len() <= count || whole::seconds(sum, &exact) <= budget.max(count as f64 * pixel);
+    let soon = || whole::seconds(sum, &exact) <= budget.max(count as f64 * pixel);
+    let whole = grid.len() <= count || (grid.len() <= WHOLE && soon());
     let (pixels, values) = if whole {
-        ((0..grid.len()).collect(), whole::samples(sum, &exact, || ())?)
+        ((0..grid.len()).collect(), whole::samples(sum, &exact, LINES, || ())?)
     } else {
         let pixels = draw(field, &rows, grid, count, thorough);
         let values = exact.at(sum, &pixels, is_quick)?;

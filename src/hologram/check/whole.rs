@@ -43,12 +43,12 @@ pub(in crate::hologram) fn field(sum: &PointSum) -> Result<Field> {
     let PointSum { optics, grid, progress, .. } = *sum;
     let exact = Exact::new(sum);
     progress.start("hologram: exact sum", (grid.height + exact.near.len()) as u64);
-    let samples = samples(sum, &exact, || progress.advance(1))?;
+    let samples = samples(sum, &exact, LINES, || progress.advance(1))?;
     Ok(Field { grid: *grid, wavelength: optics.wavelength, samples }.to_f32())
 }
 
-/// Its samples in double precision; `advance` is called for each row and each near point.
-pub(super) fn samples(sum: &PointSum, exact: &Exact, advance: impl Fn() + Sync) -> Result<Vec<Complex64>> {
+/// Its samples in double precision, near points' lines within `most` bytes; `advance` is called for each row and near point.
+pub(super) fn samples(sum: &PointSum, exact: &Exact, most: usize, advance: impl Fn() + Sync) -> Result<Vec<Complex64>> {
     let PointSum { optics, grid, cull, progress, .. } = *sum;
     let waves = Waves::new(optics, cull);
     let mut samples = vec![Complex64::default(); grid.len()];
@@ -65,7 +65,7 @@ pub(super) fn samples(sum: &PointSum, exact: &Exact, advance: impl Fn() + Sync) 
         let mut bytes = 0;
         let fits = |s: &&_| {
             bytes += Near::line_bytes(optics, grid, s);
-            bytes <= LINES
+            bytes <= most
         };
         let (now, later) = rest.split_at(rest.iter().take_while(fits).count().max(1));
         let one = |s: &_| if progress.stopped() { None } else { Lines::new(optics, grid, s) };
