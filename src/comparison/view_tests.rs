@@ -62,14 +62,14 @@ fn an_edge_out_of_focus_is_blurred_as_in_the_light_field() {
 }
 
 #[test]
-#[ignore = "the figures' panel, for half a minute"]
+#[ignore = "the figures' panel; fails: 3.4 % where 3 % are asked"]
 fn an_edge_out_of_focus_is_blurred_as_in_the_light_field_on_a_whole_panel() {
     edge_out_of_focus(WHOLE, 0.03);
 }
 
 /// A pupil that moves 5 mm within an eye box sees near and far shift against each other, as in the light field.
 #[test]
-#[ignore = "the figures' panel, for half a minute"]
+#[ignore = "the figures' panel; fails: 8.7 % where 5 % are asked"]
 fn near_and_far_shift_against_each_other_as_in_the_light_field() {
     // Bars 0.8 mm wide, near above and far below.
     let bars = |p: DVec2, above: bool| (p.y > 0.0) == above && p.x.abs() < 5e-3 && (p.x / 1.6e-3).rem_euclid(1.0) < 0.5;

@@ -102,6 +102,17 @@ impl Optics {
         let sine = self.wavelength * self.taper[axis].limit;
         distance * sine / (1.0 - sine * sine).sqrt()
     }
+    /// How far aside a point's light goes along an axis on the panel, of a band whose axes end at `ends` [cycles/m]: the other
+    /// axis tilts the cone outwards in the corners [m].
+    pub(crate) fn spread(&self, axis: usize, distance: f64, ends: [f64; 2]) -> f64 {
+        let [sine, other] = [axis, 1 - axis].map(|axis| (self.wavelength * ends[axis]).powi(2));
+        distance * (sine / (1.0 - sine - other).max(0.02)).sqrt()
+    }
+    /// Part of the band ±1/(2·pitch) that the taper fills: 1, less where the wavelength ends it. A kernel is as many times
+    /// wider in pixels.
+    pub(crate) fn filled(&self, axis: usize) -> f64 {
+        2.0 * self.pitch[axis] * self.taper[axis].limit
+    }
     /// Error of the far form with its cross term at this distance (relative L2 over the point's cone).
     pub(crate) fn far_error(&self, distance: f64) -> f64 {
         let pitch = self.pitch[0].max(self.pitch[1]);

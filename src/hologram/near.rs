@@ -58,12 +58,10 @@ pub(crate) fn rank(optics: &Optics, distance: f64) -> Option<usize> {
     None
 }
 
-/// Pixels that a kernel reaches along an axis, `tail` pixels beyond the cone, which the other axis tilts outwards.
+/// Pixels that a kernel reaches along an axis, `tail` pixels beyond the cone.
 fn reach(optics: &Optics, axis: usize, distance: f64, tail: f64) -> f64 {
-    let [sine, other] = [axis, 1 - axis].map(|axis| (optics.wavelength * optics.taper[axis].limit).powi(2));
-    let cone = distance * (sine / (1.0 - sine - other).max(0.02)).sqrt();
-    let narrow = 2.0 * optics.pitch[axis] * optics.taper[axis].limit;
-    cone / optics.pitch[axis] + tail / narrow
+    let cone = optics.spread(axis, distance, optics.taper.map(|taper| taper.limit));
+    cone / optics.pitch[axis] + tail / optics.filled(axis)
 }
 
 /// Memory of a batch of kernels [bytes].

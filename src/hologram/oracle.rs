@@ -190,9 +190,8 @@ impl Spectrum {
     /// Where the field has died away [m], and the number of frequencies, along an axis.
     fn lattice(optics: &Optics, axis: usize, distance: f64) -> (f64, usize) {
         let taper = optics.taper[axis];
-        let sine = (optics.wavelength * taper.reach(3.2)).min(0.95);
         // The taper's transform decays as exp(−(πsx)²): 1e-12 at 1.67/s.
-        let reach = distance * sine / (1.0 - sine * sine).sqrt() + 1.67 / taper.width;
+        let reach = optics.spread(axis, distance, optics.taper.map(|taper| taper.reach(3.2))) + 1.67 / taper.width;
         (reach, (2.2 * reach * 2.0 * taper.reach(COVERED)).ceil() as usize + 8)
     }
 

@@ -53,11 +53,7 @@ impl Near {
     /// Where the field has died away [m] and the number of frequencies on one side of zero.
     fn lattice(optics: &Optics, axis: usize, distance: f64) -> (f64, usize) {
         let taper = optics.taper[axis];
-        let sine = (optics.wavelength * taper.reach(3.2)).min(0.95);
-        // The other axis tilts the cone.
-        let other = (optics.wavelength * optics.taper[1 - axis].reach(3.2)).min(0.95);
-        let root = (1.0 - sine * sine - other * other).max(0.02).sqrt();
-        let reach = distance * sine / root + 1.67 / taper.width;
+        let reach = optics.spread(axis, distance, optics.taper.map(|taper| taper.reach(3.2))) + 1.67 / taper.width;
         (reach, (2.1 * reach * taper.reach(5.0)).ceil() as usize + 4)
     }
 

@@ -37,6 +37,24 @@ pub(super) trait Real:
     fn split_power(x: Self) -> (Self, Self);
 }
 
+/// What both floats have of their own.
+macro_rules! own_functions {
+    () => {
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            self.sqrt()
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            self.abs()
+        }
+        #[inline(always)]
+        fn mul_add(self, by: Self, more: Self) -> Self {
+            self.mul_add(by, more)
+        }
+    };
+}
+
 impl Real for f64 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
@@ -52,21 +70,10 @@ impl Real for f64 {
     fn double(self) -> f64 {
         self
     }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.sqrt()
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.abs()
-    }
+    own_functions!();
     #[inline(always)]
     fn round(self) -> Self {
         round(self)
-    }
-    #[inline(always)]
-    fn mul_add(self, by: Self, more: Self) -> Self {
-        self.mul_add(by, more)
     }
     #[inline(always)]
     fn split_power(x: Self) -> (Self, Self) {
@@ -90,34 +97,21 @@ impl Real for f32 {
     fn double(self) -> f64 {
         f64::from(self)
     }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.sqrt()
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.abs()
-    }
+    own_functions!();
     #[inline(always)]
     fn round(self) -> Self {
-        // 1.5·2²³.
-        const ROUND: f32 = 12_582_912.0;
-        (self + ROUND) - ROUND
-    }
-    #[inline(always)]
-    fn mul_add(self, by: Self, more: Self) -> Self {
-        self.mul_add(by, more)
+        (self + ROUND_F32) - ROUND_F32
     }
     #[inline(always)]
     fn split_power(x: Self) -> (Self, Self) {
-        const ROUND: f32 = 12_582_912.0;
-        let shifted = x + ROUND;
-        (f32::from_bits(shifted.to_bits().wrapping_add(127) << 23), x - (shifted - ROUND))
+        let shifted = x + ROUND_F32;
+        (f32::from_bits(shifted.to_bits().wrapping_add(127) << 23), x - (shifted - ROUND_F32))
     }
 }
 
-/// 1.5·2⁵²: added, the nearest integer stands in the low bits.
+/// 1.5·2⁵², and 1.5·2²³: added, the nearest integer stands in the low bits.
 const ROUND: f64 = 6_755_399_441_055_744.0;
+const ROUND_F32: f32 = 12_582_912.0;
 
 /// The nearest integer of |x| < 2⁵¹.
 #[inline(always)]

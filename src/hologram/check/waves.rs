@@ -88,7 +88,8 @@ impl Waves {
     pub(super) fn add(&self, points: &[PointWave], places: &[[f64; 2]], sums: &mut [Complex64]) {
         // To 8e-11 where |arg z| ≤ π/4.
         static SERIES: LazyLock<Weideman<24>> = LazyLock::new(Weideman::new);
-        self.dispatch(&Batch::new(points), &Series { scale: SERIES.scale, terms: SERIES.terms }, places, sums);
+        let series = Series { scale: SERIES.scale, terms: SERIES.terms };
+        Job { waves: self, batch: &Batch::new(points), series, places }.run(sums);
     }
 
     /// As [`Waves::add`], taper and wave in single precision.
@@ -96,30 +97,7 @@ impl Waves {
         // To 4.4e-6.
         static SERIES: LazyLock<Weideman<12>> = LazyLock::new(Weideman::new);
         let series = Series { scale: SERIES.scale as f32, terms: SERIES.terms.map(|term| term as f32) };
-        self.dispatch(&Batch::new(points), &series, places, sums);
-    }
-
-    fn dispatch<T: Real, const N: usize>(
-        &self,
-        batch: &Batch,
-        series: &Series<T, N>,
-        places: &[[f64; 2]],
-        sums: &mut [Complex64],
-    ) {
-        #[cfg(target_arch = "x86_64")]
-        {
-            let fma = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
-            let wide = is_x86_feature_detected!("avx512dq") && is_x86_feature_detected!("avx512vl");
-            if is_x86_feature_detected!("avx512f") && wide && fma {
-                // SAFETY: the features were detected.
-                return unsafe { avx512(self, batch, series, places, sums) };
-            }
-            if fma {
-                // SAFETY: the features were detected.
-                return unsafe { avx2(self, batch, series, places, sums) };
-            }
-        }
-        add::<T, N, false>(self, batch, series, places, sums);
+        Job { waves: self, batch: &Batch::new(points), series, places }.run(sums);
     }
 }
 
@@ -129,28 +107,44 @@ struct Series<T, const N: usize> {
     terms: [T; N],
 }
 
+/// A batch of points whose field is wanted at places.
+struct Job<'a, T, const N: usize> {
+    waves: &'a Waves,
+    batch: &'a Batch,
+    series: Series<T, N>,
+    places: &'a [[f64; 2]],
+}
+
+impl<T: Real, const N: usize> Job<'_, T, N> {
+    /// Adds the field to the places' sums, by the widest instruction set.
+    fn run(&self, sums: &mut [Complex64]) {
+        #[cfg(target_arch = "x86_64")]
+        {
+            let fma = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+            let wide = is_x86_feature_detected!("avx512dq") && is_x86_feature_detected!("avx512vl");
+            if is_x86_feature_detected!("avx512f") && wide && fma {
+                // SAFETY: the features were detected.
+                return unsafe { avx512(self, sums) };
+            }
+            if fma {
+                // SAFETY: the features were detected.
+                return unsafe { avx2(self, sums) };
+            }
+        }
+        add::<T, N, false>(self, sums);
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
-unsafe fn avx512<T: Real, const N: usize>(
-    waves: &Waves,
-    batch: &Batch,
-    series: &Series<T, N>,
-    places: &[[f64; 2]],
-    sums: &mut [Complex64],
-) {
-    add::<T, N, true>(waves, batch, series, places, sums);
+unsafe fn avx512<T: Real, const N: usize>(job: &Job<T, N>, sums: &mut [Complex64]) {
+    add::<T, N, true>(job, sums);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn avx2<T: Real, const N: usize>(
-    waves: &Waves,
-    batch: &Batch,
-    series: &Series<T, N>,
-    places: &[[f64; 2]],
-    sums: &mut [Complex64],
-) {
-    add::<T, N, true>(waves, batch, series, places, sums);
+unsafe fn avx2<T: Real, const N: usize>(job: &Job<T, N>, sums: &mut [Complex64]) {
+    add::<T, N, true>(job, sums);
 }
 
 /// A value for each point of a block.
@@ -167,13 +161,8 @@ impl<T: Real> Pair<T> {
 }
 
 #[inline(always)]
-fn add<T: Real, const N: usize, const FMA: bool>(
-    waves: &Waves,
-    batch: &Batch,
-    series: &Series<T, N>,
-    places: &[[f64; 2]],
-    sums: &mut [Complex64],
-) {
+fn add<T: Real, const N: usize, const FMA: bool>(job: &Job<T, N>, sums: &mut [Complex64]) {
+    let Job { waves, batch, series, places } = job;
     for (at, sum) in places.iter().zip(sums) {
         let mut total = Pair::<T>::ZERO;
         for start in (0..batch.count).step_by(BLOCK) {

@@ -158,13 +158,13 @@ impl Parameters {
         let rank = first.powi(power) * scale * unevenness;
         // A kernel is as wide as its band is narrow: where that ends below half a cycle a pixel, in more pixels.
         let tail = |axis: usize| {
-            let narrow = 2.0 * optics.pitch[axis] * optics.taper[axis].limit;
-            tail_error(self.tail * narrow, optics.cone(axis, h) / optics.pitch[axis] * narrow)
+            let filled = optics.filled(axis);
+            tail_error(self.tail * filled, optics.cone(axis, h) / optics.pitch[axis] * filled)
         };
         let parts = [rank, tail(0).max(tail(1)), self.table.error()];
-        // Points in one place have their errors in one place, too: measured up to 1.45 times those of scattered ones.
-        let crowded = if cloud.places.iter().all(|[low, high]| high - low < 4.0) { 1.5 } else { 1.0 };
-        crowded * more.sqrt() * margin(cloud.steepness) * parts.iter().map(|part| part * part).sum::<f64>().sqrt()
+        // Points in one place have their errors in one place, too: measured up to 1.55 times those of scattered ones.
+        let crowded = if cloud.places.iter().all(|[low, high]| high - low < 4.0) { 1.6 } else { 1.0 };
+        crowded * more * margin(cloud.steepness) * parts.iter().map(|part| part * part).sum::<f64>().sqrt()
     }
     /// The cheapest for a wanted error within a memory budget [bytes], or the smallest where none fits; `None` where up to
     /// four moments do not reach the error.
@@ -236,12 +236,9 @@ fn is_square(optics: &Optics) -> bool {
     optics.pitch[0] == optics.pitch[1]
 }
 
-/// Where a point's light has died away on the panel, but for the taper's tail [m]: erfc(2.6)/2 = 1.2e-4. In the band's
-/// corners the other axis tilts the cone outwards, too.
+/// Where a point's light has died away on the panel, but for the taper's tail [m]: erfc(2.6)/2 = 1.2e-4.
 fn reach(optics: &Optics, axis: usize, distance: f64) -> f64 {
-    let [sine, other] =
-        [axis, 1 - axis].map(|axis| (optics.wavelength * optics.taper[axis].reach(2.6)).min(0.9).powi(2));
-    distance * (sine / (1.0 - sine - other).max(0.02)).sqrt()
+    optics.spread(axis, distance, optics.taper.map(|taper| taper.reach(2.6)))
 }
 
 /// Factors beside 2, 3 and 5 of lengths that the CPU's transforms are fast at.
