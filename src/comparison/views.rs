@@ -51,9 +51,9 @@ pub fn view_cases() -> Vec<ViewCase> {
         case("10 × 2 mm", 10.0, 2.0, 3, 130),
         case("10 × 10 mm", 10.0, 10.0, 9, 130),
         case("22 × 14 mm", 22.0, 14.0, 24, 80),
-        all("all of the light", 1, 150),
-        all("all of the light", 3, 120),
-        all("all of the light", 8, 100),
+        all("all of the light, one frame", 1, 150),
+        all("all of the light, 3 frames", 3, 120),
+        all("all of the light, 8 frames", 8, 100),
     ]
 }
 
@@ -274,7 +274,7 @@ mod tests {
         let case = view_cases().swap_remove(0);
         let ideal = figures(&scene, &case, "view", &setup);
         assert!(ideal.psnr > 35.0 && ideal.ssim > 0.93, "{ideal:?}");
-        assert!(ideal.contrast < 0.15 && ideal.box_efficiency > 0.5, "{ideal:?}");
+        assert!(ideal.contrast < 0.15 && ideal.box_efficiency > 0.4, "{ideal:?}");
         let speckle = figures(&scene, &case, "kinoform", &setup);
         assert!(speckle.psnr < 13.0 && speckle.contrast > 0.8, "{speckle:?}");
         let faulty = &crate::comparison::panels(1920, 1080).expect("panels")[2];
@@ -289,6 +289,6 @@ mod tests {
         let scene = ViewScene::layers(&setup).expect("layers");
         let case = view_cases().into_iter().find(|case| case.frames == 3).expect("case");
         let seen = figures(&scene, &case, "view", &setup);
-        assert!(seen.psnr > 24.0 && seen.ssim > 0.6, "{seen:?}");
+        assert!(seen.psnr > 26.0 && seen.ssim > 0.8, "{seen:?}");
     }
 }

@@ -1,10 +1,12 @@
-//! Where the descent starts: the picture itself, on waves that converge on the eye.
+//! Where the descent starts: the picture itself, on waves that converge on places of the eye box.
 
 use super::ViewTarget;
 use crate::encode::model::PanelModel;
+use crate::field::{Complex32, Complex64, Grid};
 use crate::light_field::retina::Targets;
 use crate::light_field::{Look, Pupil};
 use crate::panel::Setup;
+use crate::random::Random;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -21,65 +23,103 @@ pub fn carried_over(wishes: &[f32], setup: &Setup, wavelength: f64, from: DVec3,
     (0..grid.len().min(wishes.len())).into_par_iter().map(phase).collect()
 }
 
-/// Phases of a wave that converges on the middle of a frame's cell of the eye box, as bright on each pixel as the picture is there
-/// to an eye in that place [rad]: two phases φ ± arccos(a) for one amplitude a, as in double phase, whose unwanted light goes far
-/// beside the eye. From a wave of one brightness dark places would take most steps to become dark.
+/// Phases of waves that converge on spots of the eye box ([`Spots`](super::spots::Spots)), together as bright on each pixel as
+/// the pictures are there to eyes in those places [rad]: two phases φ ± arccos(a) for one amplitude a, as in double phase, whose
+/// unwanted light goes far beside the eye. From waves of one brightness dark places would take most steps to become dark. What is
+/// brighter than the brightest part of one picture times the root of the number of waves is cut.
 pub(super) fn converging(
     target: &ViewTarget,
     targets: &Targets,
     model: &PanelModel,
-    index: usize,
-    count: usize,
+    spots: &[DVec2],
+    random: &mut Random,
 ) -> Vec<f32> {
-    let viewer = target.viewer;
-    // Pupils may move within the box; of all of the light each frame fills a cell.
-    let extent = match viewer.pupil {
-        Pupil::All => target.retina.taken,
-        Pupil::Diameter(pupil) => viewer.eye_box + if count > 1 { DVec2::splat(0.5 * pupil) } else { DVec2::ZERO },
-    };
-    let columns = (1..=count)
-        .filter(|columns| count.is_multiple_of(*columns))
-        .min_by(|a, b| {
-            let uneven = |columns: usize| {
-                let rows = count / columns;
-                ((extent.x / columns as f64) / (extent.y / rows as f64).max(1e-9)).ln().abs()
-            };
-            uneven(*a).total_cmp(&uneven(*b))
-        })
-        .unwrap_or(1);
-    let rows = count / columns;
-    let place = |i: usize, count: usize| (i as f64 + 0.5) / count as f64 - 0.5;
-    let cell = DVec2::new(place(index % columns, columns) * extent.x, -place(index / columns, rows) * extent.y);
-    let at = viewer.eye.truncate() + cell;
-    let [near, far] = target.light.depth.map(|z| 1.0 / (viewer.eye.z - z));
-    let half = 0.5 * viewer.eye_box;
-    let pupil = viewer.eye.truncate() + cell.clamp(-half, half);
-    let seen = match viewer.pupil {
-        // A wave from one place has the picture of a pinhole there.
-        Pupil::All => targets.pinhole(at),
-        Pupil::Diameter(_) => targets.amplitude(&Look { pupil, focus: viewer.eye.z - 2.0 / (near + far) }),
-    };
-    let brightest = seen.iter().fold(f32::MIN_POSITIVE, |most, &a| most.max(a));
     let (grid, lattice) = (model.grid, &target.retina.lattice);
-    // The picture at a place of the panel's plane, linear between samples.
-    let amplitude = |x: f64, y: f64| {
-        let inside = |place: f64, count: usize| place.clamp(0.0, count as f64 - 1.0);
-        let (column, row) = (inside(lattice.column(x), lattice.width), inside(lattice.row(y), lattice.height));
-        let (left, top) = (column as usize, row as usize);
-        let (right, bottom) = ((left + 1).min(lattice.width - 1), (top + 1).min(lattice.height - 1));
-        let line = |row: usize| {
-            let share = (column - left as f64) as f32;
-            seen[row * lattice.width + left] * (1.0 - share) + seen[row * lattice.width + right] * share
+    let waves: Vec<Wave> =
+        spots.iter().map(|spot| Wave::new(target, targets, &grid, *spot, spots.len() == 1, random)).collect();
+    let brightest = waves.iter().flat_map(|wave| &wave.seen).fold(f32::MIN_POSITIVE, |most, &a| most.max(a));
+    let full = brightest * (spots.len() as f32).sqrt();
+    let columns: Vec<Between> =
+        (0..grid.width).map(|i| Between::new(lattice.column(grid.x(i)), lattice.width)).collect();
+    let mut phases = vec![0.0f32; grid.len()];
+    let line = |(row, line): (usize, &mut [f32])| {
+        let down = Between::new(lattice.row(grid.y(row)), lattice.height);
+        let mut sum = vec![Complex32::default(); grid.width];
+        let mut picture = vec![0.0f32; lattice.width];
+        for wave in &waves {
+            let of = |row: usize| &wave.seen[row * lattice.width..][..lattice.width];
+            let lines = of(down.first).iter().zip(of(down.second));
+            picture.iter_mut().zip(lines).for_each(|(out, (a, b))| *out = a + down.share * (b - a));
+            let turn = wave.down[row];
+            for ((sum, across), place) in sum.iter_mut().zip(&wave.across).zip(&columns) {
+                let (a, b) = (picture[place.first], picture[place.second]);
+                *sum += across * turn * (a + place.share * (b - a));
+            }
+        }
+        for (column, (phase, u)) in line.iter_mut().zip(&sum).enumerate() {
+            let aside = (u.norm() / full).min(1.0).acos();
+            *phase = (u.arg() + if (column + row).is_multiple_of(2) { aside } else { -aside }).rem_euclid(TAU as f32);
+        }
+    };
+    phases.par_chunks_mut(grid.width).enumerate().for_each(line);
+    phases
+}
+
+/// A picture on a wave that converges on a spot: its phase is that of a column and a row, −π/λZ·((x − e_x)² + (y − e_y)²).
+struct Wave {
+    /// Amplitudes on the retina's lattice.
+    seen: Vec<f32>,
+    across: Vec<Complex32>,
+    down: Vec<Complex32>,
+}
+
+impl Wave {
+    fn new(
+        target: &ViewTarget,
+        targets: &Targets,
+        grid: &Grid,
+        spot: DVec2,
+        is_alone: bool,
+        random: &mut Random,
+    ) -> Self {
+        let viewer = target.viewer;
+        let at = viewer.eye.truncate() + spot;
+        let seen = match viewer.pupil {
+            // All pupils see it, and nothing else of this frame: what such a pupil sees.
+            Pupil::Diameter(_) if is_alone => {
+                let [near, far] = target.light.depth.map(|z| 1.0 / (viewer.eye.z - z));
+                let half = 0.5 * viewer.eye_box;
+                let pupil = viewer.eye.truncate() + spot.clamp(-half, half);
+                targets.amplitude(&Look { pupil, focus: viewer.eye.z - 2.0 / (near + far) })
+            }
+            // A wave from one place has the picture of a pinhole there; pupils see several.
+            _ => targets.pinhole(at),
         };
-        let share = (row - top as f64) as f32;
-        line(top) * (1.0 - share) + line(bottom) * share
-    };
-    let phase = |i: usize| {
-        let (column, row) = (i % grid.width, i / grid.width);
-        let (x, y) = (grid.x(column), grid.y(row));
-        let lens = -PI / (target.wavelength * viewer.eye.z) * ((x - at.x).powi(2) + (y - at.y).powi(2));
-        let aside = f64::from((amplitude(x, y) / brightest).clamp(0.0, 1.0)).acos();
-        (lens + if (column + row).is_multiple_of(2) { aside } else { -aside }).rem_euclid(TAU) as f32
-    };
-    (0..grid.len()).into_par_iter().map(phase).collect()
+        // Waves of one frame that are alike would be bright together.
+        let turn = if is_alone { 0.0 } else { TAU * random.uniform() };
+        let wave = |off: f64, turn: f64| {
+            let u = Complex64::cis((turn - PI / (target.wavelength * viewer.eye.z) * off * off) % TAU);
+            Complex32::new(u.re as f32, u.im as f32)
+        };
+        Self {
+            seen,
+            across: (0..grid.width).map(|i| wave(grid.x(i) - at.x, turn)).collect(),
+            down: (0..grid.height).map(|j| wave(grid.y(j) - at.y, 0.0)).collect(),
+        }
+    }
+}
+
+/// A place between two samples of a line, at its ends the last one.
+struct Between {
+    first: usize,
+    second: usize,
+    share: f32,
+}
+
+impl Between {
+    fn new(place: f64, count: usize) -> Self {
+        let place = place.clamp(0.0, count as f64 - 1.0);
+        let first = place as usize;
+        Self { first, second: (first + 1).min(count - 1), share: (place - first as f64) as f32 }
+    }
 }
