@@ -115,6 +115,11 @@ impl PanelModel {
         (self.crosstalk > 0.0).then(|| self.light(wishes).total)
     }
 
+    /// Whether pixels show any phase that they are asked for, without regard to their neighbours.
+    pub(super) fn shows_wishes(&self) -> bool {
+        self.range.is_none() && self.crosstalk <= 0.0
+    }
+
     /// Slopes of what the panel shows as slopes of its pixels' wishes: crosstalk spreads each over its neighbours.
     pub(super) fn pulled_back(&self, slopes: Vec<f32>) -> Vec<f32> {
         if self.crosstalk > 0.0 { blurred(&slopes, self.grid.width, self.crosstalk) } else { slopes }

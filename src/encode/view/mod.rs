@@ -237,9 +237,11 @@ impl ViewEncoding {
         };
         // The start is near what is sought, and long steps would leave it: after 50 steps for a known eye Cornell's room is 44.2 dB
         // alike with 0.2, 48.8 with 0.05 (the layers 40.9 and 40.2); after 130 for 10 x 10 mm nine frames of the layers are 25.9 with
-        // 0.1 and 27.1 with 0.05. Many steps for a known eye are the better the shorter they are. Planes are further off.
-        let slower = if is_known(target.viewer) { (50.0 / iterations.max(1) as f64).sqrt().min(2.0) } else { 1.0 };
-        let rate = if whole { 0.1 } else { 0.05 * slower };
+        // 0.1 and 27.1 with 0.05. Many steps for a known eye are the better the shorter they are. Planes are further off, and so is what
+        // a panel shows that cannot show the start: its phases are cut, or run into each other.
+        let (rate, most) = if model.shows_wishes() { (0.05, 2.0) } else { (0.2, 1.0) };
+        let slower = if is_known(target.viewer) { (50.0 / iterations.max(1) as f64).sqrt().min(most) } else { 1.0 };
+        let rate = if whole { 0.1 } else { rate * slower };
         let scattered = Spots::are_scattered(target.viewer);
         let looks = match (whole, scattered) {
             (true, _) => 1,
