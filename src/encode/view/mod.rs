@@ -160,9 +160,10 @@ impl ViewEncoding {
             None => {
                 let Spots(spots) = Spots::new(target.viewer, target.retina, count);
                 let of = |(index, spots): (usize, &Vec<DVec2>)| {
-                    converging(target, &targets, &model, spots, &mut Random::new(self.seed ^ 0x5907, index as u64))
+                    let random = &mut Random::new(self.seed ^ 0x5907, index as u64);
+                    converging(target, &targets, &model, spots, random, progress)
                 };
-                spots.iter().enumerate().map(of).collect()
+                spots.iter().enumerate().map(of).collect::<Result<_>>()?
             }
         };
         if is_new {
@@ -173,7 +174,7 @@ impl ViewEncoding {
         let (found, efficiency) = if target.retina.pupil.is_finite() {
             let optics = Optics::new(&model.grid, target.retina, target.wavelength);
             let found =
-                self.descend(&Pupils { optics: &optics, targets: &targets }, wishes, target, &model, progress)?;
+                own.descend(&Pupils { optics: &optics, targets: &targets }, wishes, target, &model, progress)?;
             let efficiency = efficiency(target, &optics, &model, &found.wishes);
             (found, efficiency)
         } else {
@@ -236,9 +237,9 @@ impl ViewEncoding {
             (false, false) => POOL,
         };
         // The start is near what is sought, and long steps would leave it: after 50 steps for a known eye Cornell's room is 44.2 dB
-        // alike with 0.2, 48.8 with 0.05 (the layers 40.9 and 40.2); after 130 for 10 x 10 mm nine frames of the layers are 25.9 with
-        // 0.1 and 27.1 with 0.05. Many steps for a known eye are the better the shorter they are. Planes are further off, and so is what
-        // a panel shows that cannot show the start: its phases are cut, or run into each other.
+        // alike with 0.2, 48.8 with 0.05 (the layers 40.9 and 40.2); after 130 for 10 × 10 mm nine frames of the layers are 25.9
+        // with 0.1 and 27.1 with 0.05 (960 × 540). Many steps for a known eye are the better the shorter they are. Planes are
+        // further off, and so is what a panel shows that cannot show the start: its phases are cut, or run into each other.
         let (rate, most) = if model.shows_wishes() { (0.05, 2.0) } else { (0.2, 1.0) };
         let slower = if is_known(target.viewer) { (50.0 / iterations.max(1) as f64).sqrt().min(most) } else { 1.0 };
         let rate = if whole { 0.1 } else { rate * slower };

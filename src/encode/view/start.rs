@@ -1,11 +1,14 @@
 //! Where the descent starts: the picture itself, on waves that converge on places of the eye box.
 
 use super::ViewTarget;
+use super::spots::Spots;
 use crate::encode::model::PanelModel;
+use crate::error::Result;
 use crate::field::{Complex32, Complex64, Grid};
 use crate::light_field::retina::Targets;
 use crate::light_field::{Look, Pupil};
 use crate::panel::Setup;
+use crate::progress::Progress;
 use crate::random::Random;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -23,26 +26,36 @@ pub fn carried_over(wishes: &[f32], setup: &Setup, wavelength: f64, from: DVec3,
     (0..grid.len().min(wishes.len())).into_par_iter().map(phase).collect()
 }
 
-/// Phases of waves that converge on spots of the eye box ([`Spots`](super::spots::Spots)), together as bright on each pixel as
+/// Phases of waves that converge on spots of the eye box ([`Spots`]), together as bright on each pixel as
 /// the pictures are there to eyes in those places [rad]: two phases φ ± arccos(a) for one amplitude a, as in double phase, whose
 /// unwanted light goes far beside the eye. From waves of one brightness dark places would take most steps to become dark. What is
 /// brighter than the brightest part of one picture times the root of the number of waves is cut.
+///
+/// # Errors
+/// [`Error::Interrupted`](crate::Error::Interrupted) when asked to stop.
 pub(super) fn converging(
     target: &ViewTarget,
     targets: &Targets,
     model: &PanelModel,
     spots: &[DVec2],
     random: &mut Random,
-) -> Vec<f32> {
+    progress: &Progress,
+) -> Result<Vec<f32>> {
     let (grid, lattice) = (model.grid, &target.retina.lattice);
-    let waves: Vec<Wave> =
-        spots.iter().map(|spot| Wave::new(target, targets, &grid, *spot, spots.len() == 1, random)).collect();
+    let wave = |spot: &DVec2| {
+        progress.check()?;
+        Ok(Wave::new(target, targets, &grid, *spot, random))
+    };
+    let waves = spots.iter().map(wave).collect::<Result<Vec<Wave>>>()?;
     let brightest = waves.iter().flat_map(|wave| &wave.seen).fold(f32::MIN_POSITIVE, |most, &a| most.max(a));
     let full = brightest * (spots.len() as f32).sqrt();
     let columns: Vec<Between> =
         (0..grid.width).map(|i| Between::new(lattice.column(grid.x(i)), lattice.width)).collect();
     let mut phases = vec![0.0f32; grid.len()];
     let line = |(row, line): (usize, &mut [f32])| {
+        if progress.stopped() {
+            return;
+        }
         let down = Between::new(lattice.row(grid.y(row)), lattice.height);
         let mut sum = vec![Complex32::default(); grid.width];
         let mut picture = vec![0.0f32; lattice.width];
@@ -62,7 +75,8 @@ pub(super) fn converging(
         }
     };
     phases.par_chunks_mut(grid.width).enumerate().for_each(line);
-    phases
+    progress.check()?;
+    Ok(phases)
 }
 
 /// A picture on a wave that converges on a spot: its phase is that of a column and a row, −π/λZ·((x − e_x)² + (y − e_y)²).
@@ -74,19 +88,13 @@ struct Wave {
 }
 
 impl Wave {
-    fn new(
-        target: &ViewTarget,
-        targets: &Targets,
-        grid: &Grid,
-        spot: DVec2,
-        is_alone: bool,
-        random: &mut Random,
-    ) -> Self {
+    fn new(target: &ViewTarget, targets: &Targets, grid: &Grid, spot: DVec2, random: &mut Random) -> Self {
         let viewer = target.viewer;
+        let is_scattered = Spots::are_scattered(viewer);
         let at = viewer.eye.truncate() + spot;
         let seen = match viewer.pupil {
             // All pupils see it, and nothing else of this frame: what such a pupil sees.
-            Pupil::Diameter(_) if is_alone => {
+            Pupil::Diameter(_) if !is_scattered => {
                 let [near, far] = target.light.depth.map(|z| 1.0 / (viewer.eye.z - z));
                 let half = 0.5 * viewer.eye_box;
                 let pupil = viewer.eye.truncate() + spot.clamp(-half, half);
@@ -96,7 +104,7 @@ impl Wave {
             _ => targets.pinhole(at),
         };
         // Waves of one frame that are alike would be bright together.
-        let turn = if is_alone { 0.0 } else { TAU * random.uniform() };
+        let turn = if is_scattered { TAU * random.uniform() } else { 0.0 };
         let wave = |off: f64, turn: f64| {
             let u = Complex64::cis((turn - PI / (target.wavelength * viewer.eye.z) * off * off) % TAU);
             Complex32::new(u.re as f32, u.im as f32)
