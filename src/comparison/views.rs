@@ -51,9 +51,9 @@ pub fn view_cases() -> Vec<ViewCase> {
         case("10 × 2 mm", 10.0, 2.0, 3, 130),
         case("10 × 10 mm", 10.0, 10.0, 9, 130),
         case("22 × 14 mm", 22.0, 14.0, 24, 80),
-        all("all of the light, one frame", 1, 150),
-        all("all of the light, 3 frames", 3, 120),
-        all("all of the light, 8 frames", 8, 100),
+        all("all of the light, one frame", 1, 450),
+        all("all of the light, 3 frames", 3, 200),
+        all("all of the light, 8 frames", 8, 150),
     ]
 }
 

@@ -2,7 +2,7 @@
 //! crosstalk and the wave that falls on it.
 
 use crate::error::{Error, Result};
-use crate::field::{Complex32, Complex64, Grid};
+use crate::field::{Complex32, Complex64, Grid, phasor, zeroed};
 use crate::panel::simulated::{blurred, illuminate};
 use crate::panel::{DriveCurve, Illumination, Modulation, PanelProfile};
 use rayon::prelude::*;
@@ -103,7 +103,7 @@ impl PanelModel {
         let (total, modulated) = if self.crosstalk > 0.0 {
             let phases: Vec<f32> = wishes.par_iter().map(|&wish| self.show(wish).0).collect();
             let phases = blurred(&phases, self.grid.width, self.crosstalk);
-            phases.par_iter().enumerate().map(|(i, &p)| lit(i, Complex32::from_polar(self.fill, p))).unzip()
+            phases.par_iter().enumerate().map(|(i, &p)| lit(i, phasor(p * (1.0 / TAU)) * self.fill)).unzip()
         } else {
             wishes.par_iter().enumerate().map(|(i, &wish)| lit(i, self.show(wish).1)).unzip()
         };
@@ -112,12 +112,26 @@ impl PanelModel {
 
     /// The light of all pixels where neighbours blend, which no pixel's own wish tells; `None` without crosstalk.
     pub(super) fn blended(&self, wishes: &[f32]) -> Option<Vec<Complex32>> {
-        (self.crosstalk > 0.0).then(|| self.light(wishes).total)
+        if !self.blends() {
+            return None;
+        }
+        let mut phases = vec![0.0f32; wishes.len()];
+        phases.par_iter_mut().zip(wishes).for_each(|(phase, &wish)| *phase = self.show(wish).0);
+        let phases = blurred(&phases, self.grid.width, self.crosstalk);
+        let mut light = zeroed(wishes.len());
+        let width = self.grid.width;
+        light.par_chunks_mut(width).zip(phases.par_chunks(width)).for_each(|(light, phases)| {
+            light.iter_mut().zip(phases).for_each(|(u, &p)| *u = phasor(p * (1.0 / TAU)) * self.fill + self.dead);
+        });
+        if let Some(wave) = &self.incident {
+            light.par_iter_mut().zip(wave).for_each(|(u, wave)| *u *= wave);
+        }
+        Some(light)
     }
 
-    /// Whether pixels show any phase that they are asked for, without regard to their neighbours.
-    pub(super) fn shows_wishes(&self) -> bool {
-        self.range.is_none() && self.crosstalk <= 0.0
+    /// Whether neighbours blend.
+    pub(super) fn blends(&self) -> bool {
+        self.crosstalk > 0.0
     }
 
     /// Slopes of what the panel shows as slopes of its pixels' wishes: crosstalk spreads each over its neighbours.

@@ -88,12 +88,13 @@ pub(crate) fn fast_length(least: usize, step: usize, others: &[usize]) -> usize 
     (least.div_ceil(step).max(1)..).find(is_fast).map_or(least, |m| step * m)
 }
 
-/// Columns that one task transforms together: 16 columns of complex f32 are two cache lines a row.
+/// Columns that one task transforms together: 16 columns of complex f32 are two cache lines a row, and with their transforms fit
+/// a second-level cache.
 const STRIP: usize = 16;
 
 /// A planned transform of one size, forward and inverse, usable from any number of threads.
 ///
-/// Memory: one copy of the samples while it runs. The same bits for any number of threads.
+/// In place but for a strip of columns a thread. The same bits for any number of threads.
 ///
 /// A transform that is asked to stop ends within a few rows or columns on each thread; the samples are then of no use, and
 /// the caller's next [`Progress::check`] fails.
@@ -120,14 +121,15 @@ impl<T: FftNum> Fft2<T> {
     /// Σ u·exp(−i2π(…)), in place.
     pub fn forward(&self, samples: &mut [Complex<T>], progress: &Progress) {
         self.rows(samples, Fft1::forward, self.height, progress);
-        self.columns(samples, progress, |plan, _, strip, scratch| plan.column.forward(strip, scratch));
+        let all = [self.height; 2];
+        self.columns(samples, all, progress, |plan, _, strip, scratch| plan.column.forward(strip, scratch));
     }
 
     /// (1/N) Σ u·exp(+i2π(…)), in place.
     pub fn inverse(&self, samples: &mut [Complex<T>], progress: &Progress) {
         self.rows(samples, Fft1::inverse, self.height, progress);
         let scale = self.scale();
-        self.columns(samples, progress, |plan, _, strip, scratch| {
+        self.columns(samples, [self.height; 2], progress, |plan, _, strip, scratch| {
             plan.column.inverse(strip, scratch);
             for u in strip {
                 *u = u.scale(scale);
@@ -138,8 +140,7 @@ impl<T: FftNum> Fft2<T> {
     /// Inverse transform of (transfer × transform of the samples), in place: one column pass instead of two.
     ///
     /// `transfer(kx, column)` multiplies the transform column `kx` (`height` samples, indexed by ky) in place. Rows
-    /// from `filled_rows` on are known to be zero on entry and are skipped; rows from `wanted_rows` on are left
-    /// unspecified.
+    /// from `filled_rows` on are taken for zero, whatever they hold; rows from `wanted_rows` on are left unspecified.
     pub fn filter(
         &self,
         samples: &mut [Complex<T>],
@@ -150,7 +151,7 @@ impl<T: FftNum> Fft2<T> {
     ) {
         self.rows(samples, Fft1::forward, filled_rows, progress);
         let scale = self.scale();
-        self.columns(samples, progress, |plan, first, strip, scratch| {
+        self.columns(samples, [filled_rows, wanted_rows], progress, |plan, first, strip, scratch| {
             plan.column.forward(strip, scratch);
             if progress.stopped() {
                 return;
@@ -191,49 +192,63 @@ impl<T: FftNum> Fft2<T> {
         );
     }
 
-    /// Runs `work(plan, first column, strip, scratch)` on strips of transposed columns and puts them back.
+    /// Runs `work(plan, first column, strip, scratch)` on copies of strips of columns, one column after the other, and puts them
+    /// back. Rows from `filled` on are taken for zero and not read, those from `wanted` on are not written.
     fn columns(
         &self,
         samples: &mut [Complex<T>],
+        [filled, wanted]: [usize; 2],
         progress: &Progress,
         work: impl Fn(&Self, usize, &mut [Complex<T>], &mut [Complex<T>]) + Sync,
     ) {
-        let (width, height) = (self.width, self.height);
+        let height = self.height;
         if progress.stopped() {
             return;
         }
-        let mut turned = Fft1::dark(width * height);
-        let source = &*samples;
-        turned.par_chunks_mut(height * STRIP).enumerate().for_each_init(
-            || self.column.scratch(),
-            |scratch, (strip, columns)| {
+        let rows = filled.max(wanted);
+        let mut strips: Vec<Vec<&mut [Complex<T>]>> = Vec::new();
+        strips.resize_with(self.width.div_ceil(STRIP), || Vec::with_capacity(rows));
+        for row in samples.chunks_mut(self.width).take(rows) {
+            strips.iter_mut().zip(row.chunks_mut(STRIP)).for_each(|(strip, piece)| strip.push(piece));
+        }
+        strips.into_par_iter().enumerate().for_each_init(
+            || (Fft1::dark(height * STRIP), self.column.scratch()),
+            |(columns, scratch), (number, mut strip)| {
                 if progress.stopped() {
                     return;
                 }
-                let first = strip * STRIP;
-                for row in 0..height {
-                    let from = row * width + first;
-                    for (i, &u) in source[from..from + columns.len() / height].iter().enumerate() {
-                        columns[i * height + row] = u;
-                    }
-                }
-                work(self, first, columns, scratch);
+                let columns = &mut columns[..strip.first().map_or(0, |piece| piece.len()) * height];
+                gather(&strip[..filled], columns, height);
+                work(self, number * STRIP, columns, scratch);
+                scatter(columns, &mut strip[..wanted], height);
             },
         );
-        let turned = &turned;
-        samples.par_chunks_mut(width * STRIP).enumerate().for_each(|(block, rows)| {
-            if progress.stopped() {
-                return;
-            }
-            let first = block * STRIP;
-            let count = rows.len() / width;
-            for column in 0..width {
-                let from = column * height + first;
-                for (i, &u) in turned[from..from + count].iter().enumerate() {
-                    rows[i * width + column] = u;
-                }
-            }
-        });
+    }
+}
+
+/// Rows that are turned together: eight complex f32 are a cache line of a column.
+const TURNED: usize = 8;
+
+/// Writes pieces of rows as the beginnings of columns of `height` samples, the rest zero.
+fn gather<T: FftNum>(rows: &[&mut [Complex<T>]], columns: &mut [Complex<T>], height: usize) {
+    for column in columns.chunks_exact_mut(height) {
+        column[rows.len()..].fill(Complex::new(T::zero(), T::zero()));
+    }
+    for (block, rows) in rows.chunks(TURNED).enumerate() {
+        for (i, column) in columns.chunks_exact_mut(height).enumerate() {
+            let column = &mut column[block * TURNED..][..rows.len()];
+            column.iter_mut().zip(rows).for_each(|(u, row)| *u = row[i]);
+        }
+    }
+}
+
+/// Writes the beginnings of columns of `height` samples back into the rows.
+fn scatter<T: FftNum>(columns: &[Complex<T>], rows: &mut [&mut [Complex<T>]], height: usize) {
+    for (block, rows) in rows.chunks_mut(TURNED).enumerate() {
+        for (i, column) in columns.chunks_exact(height).enumerate() {
+            let column = &column[block * TURNED..][..rows.len()];
+            rows.iter_mut().zip(column).for_each(|(row, &u)| row[i] = u);
+        }
     }
 }
 
@@ -309,6 +324,25 @@ mod tests {
             plan.forward(&mut back, &progress);
             plan.inverse(&mut back, &progress);
             assert!(relative_error(&back, &u) < 1e-13);
+        }
+    }
+
+    #[test]
+    fn filter_takes_rows_for_dark_and_leaves_others_alone() {
+        // More than one strip of columns, and heights that blocks of rows do not divide.
+        for (width, height, filled, wanted) in [(37, 29, 11, 29), (37, 29, 29, 5), (16, 30, 9, 17), (5, 8, 0, 8)] {
+            let plan = Fft2::new(width, height);
+            let progress = Progress::new();
+            let turn = |kx: usize, column: &mut [Complex64]| {
+                column.iter_mut().enumerate().for_each(|(ky, u)| *u *= Complex64::cis(0.2 * (kx + ky * ky) as f64));
+            };
+            let mut dark = noise(width * height);
+            dark[filled * width..].fill(Complex64::default());
+            let mut garbage = dark.clone();
+            garbage[filled * width..].fill(Complex64::new(f64::NAN, 1.0));
+            plan.filter(&mut dark, height, height, turn, &progress);
+            plan.filter(&mut garbage, filled, wanted, turn, &progress);
+            assert_eq!(garbage[..wanted * width], dark[..wanted * width], "{width}×{height}, {filled}, {wanted}");
         }
     }
 

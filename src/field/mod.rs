@@ -8,6 +8,7 @@ pub mod npy;
 mod npy_head;
 pub mod npy_stack;
 pub(crate) mod npy_zip;
+mod phasor;
 pub mod stored;
 
 pub(crate) use fft::{Fft1, fast_length};
@@ -15,6 +16,7 @@ pub use fft::{Fft2, FftNum};
 pub use grid::Grid;
 pub(crate) use memory::zeroed;
 pub use num_complex::{Complex, Complex32, Complex64};
+pub(crate) use phasor::phasor;
 
 use crate::error::{Error, Result};
 

@@ -8,6 +8,7 @@ use super::{EyeGrid, LightField, Pupil, Viewer};
 use crate::error::{Error, Result};
 use crate::field::fft::{Fft1, fast_length};
 use crate::field::{Complex32, Grid};
+use crate::progress::Progress;
 use crate::units::show_length;
 use glam::DVec2;
 
@@ -149,14 +150,16 @@ pub(crate) struct Targets<'l> {
     transfer: Vec<f32>,
     row: Fft1<f32>,
     column: Fft1<f32>,
+    progress: &'l Progress,
 }
 
 impl<'l> Targets<'l> {
-    /// For a light field of one channel in light of a wavelength [m].
+    /// For a light field of one channel in light of a wavelength [m]. Pictures that are made while the job is asked to stop are of no
+    /// use; the caller's next [`Progress::check`] fails.
     ///
     /// # Errors
     /// [`Error::Parameter`] for views that do not lie on the lattice, or stand in another plane.
-    pub(crate) fn new(retina: &Retina, field: &'l LightField, wavelength: f64) -> Result<Self> {
+    pub(crate) fn new(retina: &Retina, field: &'l LightField, wavelength: f64, progress: &'l Progress) -> Result<Self> {
         let samples = match field.channels.as_slice() {
             [one] => one.as_slice(),
             _ => return Err(Error::parameter("light field", "has several channels; each laser shows one")),
@@ -170,7 +173,7 @@ impl<'l> Targets<'l> {
             return Err(Error::parameter("light field", what));
         }
         let (row, column) = (Fft1::new(retina.lattice.width), Fft1::new(retina.lattice.height));
-        let mut targets = Self { retina: *retina, field, samples, transfer: Vec::new(), row, column };
+        let mut targets = Self { retina: *retina, field, samples, transfer: Vec::new(), row, column, progress };
         if retina.pupil.is_finite() {
             targets.transfer = targets.diffraction(wavelength);
         }
@@ -283,39 +286,46 @@ impl<'l> Targets<'l> {
         let total: f32 = views.iter().map(|(_, _, weight)| weight).sum();
         let shear = 1.0 - self.retina.distance / (self.retina.distance - look.focus);
         let mut sum = vec![0.0f32; width * height];
-        let mut shifted = vec![0.0f32; (w + 4) * h];
+        // The views of a row of eye points together, shifted along x: they are shifted alike along y.
+        let mut together = vec![0.0f32; width * h];
         let mut line = vec![0.0f32; w + 6];
-        for (index, off, weight) in views {
-            // The retina's sample q shows the view's place q + d·shear: place j of the view goes to j − d·shear.
-            let (dx, dy) = (-off.x * shear / pitch_x, off.y * shear / pitch_y);
-            let ((whole_x, taps_x), (whole_y, taps_y)) = (split(dx), split(dy));
-            let scale = weight / total * unit;
-            let view = &self.samples[index * w * h..][..w * h];
-            for (row, out) in view.chunks_exact(w).zip(shifted.chunks_exact_mut(w + 4)) {
-                for (cell, &code) in line[3..].iter_mut().zip(row) {
-                    let amplitude = f32::from(code);
-                    *cell = amplitude * amplitude * scale;
+        for views in views.chunk_by(|a, b| a.0 / eyes.columns == b.0 / eyes.columns) {
+            if self.progress.stopped() {
+                break;
+            }
+            together.fill(0.0);
+            for (index, off, weight) in views {
+                // The retina's sample q shows the view's place q + d·shear: place j of the view goes to j − d·shear.
+                let (whole, taps) = split(-off.x * shear / pitch_x);
+                let scale = weight / total * unit;
+                let first = (width / 2) as isize - (w / 2) as isize + whole - 1;
+                let (skip, first) = if first < 0 { (-first as usize, 0) } else { (0, first as usize) };
+                if skip >= w + 3 || first >= width {
+                    continue;
                 }
-                for (i, out) in out.iter_mut().enumerate().take(w + 3) {
-                    let [a, b, c, d] = [line[i], line[i + 1], line[i + 2], line[i + 3]];
-                    *out = a * taps_x[3] + b * taps_x[2] + c * taps_x[1] + d * taps_x[0];
+                let view = &self.samples[index * w * h..][..w * h];
+                for (row, out) in view.chunks_exact(w).zip(together.chunks_exact_mut(width)) {
+                    for (cell, &code) in line[3..].iter_mut().zip(row) {
+                        let amplitude = f32::from(code);
+                        *cell = amplitude * amplitude * scale;
+                    }
+                    let count = (w + 3 - skip).min(width - first);
+                    let of = |tap: usize| &line[skip + tap..][..count];
+                    let (a, b, c, d) = (of(0), of(1), of(2), of(3));
+                    let out = &mut out[first..][..count];
+                    for i in 0..count {
+                        out[i] += a[i] * taps[3] + b[i] * taps[2] + c[i] * taps[1] + d[i] * taps[0];
+                    }
                 }
             }
-            let (first_x, first_y) = (
-                (width / 2) as isize - (w / 2) as isize + whole_x - 1,
-                (height / 2) as isize - (h / 2) as isize + whole_y - 1,
-            );
-            for (row, shifted) in shifted.chunks_exact(w + 4).enumerate() {
-                for (tap, &share) in taps_y.iter().enumerate() {
-                    let at = first_y + (row + tap) as isize;
-                    if share == 0.0 || !(0..height as isize).contains(&at) {
-                        continue;
-                    }
-                    let out = &mut sum[at as usize * width..][..width];
-                    let (skip, first) = if first_x < 0 { (-first_x as usize, 0) } else { (0, first_x as usize) };
-                    if skip < w + 3 && first < width {
-                        let out = out[first..].iter_mut();
-                        out.zip(&shifted[skip..w + 3]).for_each(|(out, value)| *out += share * value);
+            let (whole, taps) = split(views[0].1.y * shear / pitch_y);
+            let first = (height / 2) as isize - (h / 2) as isize + whole - 1;
+            for (row, line) in together.chunks_exact(width).enumerate() {
+                for (tap, &share) in taps.iter().enumerate() {
+                    let at = first + (row + tap) as isize;
+                    if share != 0.0 && (0..height as isize).contains(&at) {
+                        let out = &mut sum[at as usize * width..][..width];
+                        out.iter_mut().zip(line).for_each(|(out, value)| *out += share * value);
                     }
                 }
             }

@@ -207,10 +207,36 @@ fn cell_values(frame: &Frame, curve: &PixelCurve, cells: usize, faults: &Faults,
 /// border's values go on.
 pub(crate) fn blurred(values: &[f32], width: usize, sigma: f64) -> Vec<f32> {
     let kernel = gaussian(sigma);
-    let rows = blur_rows(values, width, &kernel);
-    let turned = transpose(&rows, width);
-    let height = values.len() / width;
-    transpose(&blur_rows(&turned, height, &kernel), height)
+    let (reach, height) = (kernel.len() - 1, values.len() / width);
+    let mut rows = vec![0.0; values.len()];
+    rows.par_chunks_mut(width).zip(values.par_chunks(width)).for_each_init(
+        || vec![0.0f32; width + 2 * reach],
+        |wide, (out, row)| {
+            wide[..reach].fill(row[0]);
+            wide[reach..reach + width].copy_from_slice(row);
+            wide[reach + width..].fill(row[width - 1]);
+            for (k, &weight) in kernel.iter().enumerate() {
+                add_both(out, weight, [&wide[reach - k..][..width], &wide[reach + k..][..width]], k == 0);
+            }
+        },
+    );
+    let mut out = vec![0.0; values.len()];
+    out.par_chunks_mut(width).enumerate().for_each(|(row, out)| {
+        for (k, &weight) in kernel.iter().enumerate() {
+            let line = |row: usize| &rows[row * width..][..width];
+            add_both(out, weight, [line(row.saturating_sub(k)), line((row + k).min(height - 1))], k == 0);
+        }
+    });
+    out
+}
+
+/// Adds a weight's share of the values on both sides; of the middle once, in place of what there is.
+fn add_both(out: &mut [f32], weight: f32, [before, after]: [&[f32]; 2], is_middle: bool) {
+    if is_middle {
+        out.iter_mut().zip(before).for_each(|(out, v)| *out = weight * v);
+    } else {
+        out.iter_mut().zip(before.iter().zip(after)).for_each(|(out, (a, b))| *out += weight * (a + b));
+    }
 }
 
 /// Half of a Gaussian's weights, integrated over cells: weight i is the share that lands i cells away; sums to one with
@@ -222,29 +248,6 @@ fn gaussian(sigma: f64) -> Vec<f32> {
     let weights: Vec<f64> = (0..=reach).map(|i| integral(i as f64 + 0.5) - integral(i as f64 - 0.5)).collect();
     let sum = 2.0 * weights.iter().sum::<f64>() - weights[0];
     weights.iter().map(|w| (w / sum) as f32).collect()
-}
-
-/// Rows convolved with a symmetric kernel; beyond the border the border's value goes on.
-fn blur_rows(values: &[f32], width: usize, kernel: &[f32]) -> Vec<f32> {
-    let mut out = vec![0.0; values.len()];
-    out.par_chunks_mut(width).zip(values.par_chunks(width)).for_each(|(out, row)| {
-        for (i, out) in out.iter_mut().enumerate() {
-            let pairs = (1..kernel.len()).map(|k| kernel[k] * (row[i.saturating_sub(k)] + row[(i + k).min(width - 1)]));
-            *out = kernel[0] * row[i] + pairs.sum::<f32>();
-        }
-    });
-    out
-}
-
-fn transpose(values: &[f32], width: usize) -> Vec<f32> {
-    let height = values.len() / width;
-    let mut out = vec![0.0; values.len()];
-    out.par_chunks_mut(height).enumerate().for_each(|(column, out)| {
-        for (row, out) in out.iter_mut().enumerate() {
-            *out = values[row * width + column];
-        }
-    });
-    out
 }
 
 /// What a cell of that phase [rad] or amplitude does to unit light.

@@ -55,7 +55,7 @@ const WHOLE: (f64, f64) = (27.3, 0.53);
 
 /// Time of a step, checks included, over that of its large transforms at the rate of transforms in the cache, as measured: through
 /// pupils, whose pictures are made and pulled at beside them, and on planes.
-const BESIDE: [f64; 2] = [7.0, 5.0];
+const BESIDE: [f64; 2] = [4.2, 3.1];
 
 impl ViewEncoding {
     /// What `count` frames for a viewer cost, and what to expect.

@@ -41,7 +41,7 @@ use whole::Planes;
 /// Settings of the encoding.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewEncoding {
-    /// Steps of the descent; `None`: 36 for an eye whose place is known, 120 for an eye box and for all of the light, a third of
+    /// Steps of the descent; `None`: 36 for an eye whose place is known, 120 for an eye box, 300 for all of the light, a third of
     /// these from frames that were shown before.
     pub iterations: Option<usize>,
     /// Seed of the looks.
@@ -57,7 +57,12 @@ impl Default for ViewEncoding {
 impl ViewEncoding {
     /// Steps of the descent for a viewer.
     pub fn steps(&self, viewer: &Viewer) -> usize {
-        self.iterations.unwrap_or(if is_known(viewer) { 36 } else { 120 })
+        let usual = match viewer.pupil {
+            Pupil::All => 300,
+            Pupil::Diameter(_) if is_known(viewer) => 36,
+            Pupil::Diameter(_) => 120,
+        };
+        self.iterations.unwrap_or(usual)
     }
 }
 
@@ -146,7 +151,7 @@ impl ViewEncoding {
         }
         target.viewer.check()?;
         let model = PanelModel::new(&target.setup.profile, target.wavelength, Illumination::Normal)?;
-        let targets = Targets::new(target.retina, target.light, target.wavelength)?;
+        let targets = Targets::new(target.retina, target.light, target.wavelength, progress)?;
         if target.light.is_dark() {
             return Err(Error::parameter("light field", "is dark everywhere; there is nothing to show"));
         }
@@ -239,8 +244,8 @@ impl ViewEncoding {
         // The start is near what is sought, and long steps would leave it: after 50 steps for a known eye Cornell's room is 44.2 dB
         // alike with 0.2, 48.8 with 0.05 (the layers 40.9 and 40.2); after 130 for 10 × 10 mm nine frames of the layers are 25.9
         // with 0.1 and 27.1 with 0.05 (960 × 540). Many steps for a known eye are the better the shorter they are. Planes are
-        // further off, and so is what a panel shows that cannot show the start: its phases are cut, or run into each other.
-        let (rate, most) = if model.shows_wishes() { (0.05, 2.0) } else { (0.2, 1.0) };
+        // further off, and so is what a panel shows whose pixels run into each other.
+        let (rate, most) = if model.blends() { (0.2, 1.0) } else { (0.05, 2.0) };
         let slower = if is_known(target.viewer) { (50.0 / iterations.max(1) as f64).sqrt().min(most) } else { 1.0 };
         let rate = if whole { 0.1 } else { rate * slower };
         let scattered = Spots::are_scattered(target.viewer);

@@ -62,7 +62,7 @@ impl Sight for Pupils<'_> {
 
     fn slopes<T: Send>(
         &self,
-        pulls: &[(&Prepared, Vec<Complex32>)],
+        pulls: Vec<(&Prepared, Vec<Complex32>)>,
         rows: &mut [T],
         take: impl Fn(usize, &mut T, &[Complex32]) + Sync,
         _: &Progress,

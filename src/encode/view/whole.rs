@@ -8,16 +8,22 @@
 use super::ViewTarget;
 use super::descent::{Rows, Sight};
 use crate::error::{Error, Result};
-use crate::field::{Complex32, Fft2, Grid, fast_length};
+use crate::field::{Complex32, Fft2, Grid, fast_length, phasor, zeroed};
 use crate::light_field::retina::Targets;
 use crate::light_field::{LightField, Look, Retina, Viewer};
 use crate::progress::Progress;
 use rayon::prelude::*;
-use std::f64::consts::TAU;
+use std::sync::{Mutex, PoisonError};
 
-/// Blur, in cells, from which something counts as out of focus; and what it weighs then.
+/// Blur, in cells, from which something counts as out of focus; and what it weighs then, further than so many cells from all that
+/// is in focus: an eye sees what is sharp with what is next to it.
 const BLUR: f64 = 2.0;
-const BLURRED: f64 = 0.3;
+const BLURRED: f64 = 0.1;
+const BESIDE: usize = 4;
+/// Values of the transfer that are made at once.
+const AT_ONCE: usize = 64;
+/// Rows of the picture that one task fills.
+const CELL_ROWS: usize = 8;
 /// Most samples of a plane: 0.5 GB.
 const MOST: usize = 1 << 26;
 /// Parts of the scene's depth, evenly in dioptres, and the share of the picture that makes one of them count.
@@ -38,6 +44,8 @@ pub(super) struct Planes<'a> {
     space: Grid,
     offset: [usize; 2],
     plan: Fft2<f32>,
+    /// Memory for samples of the lattice, kept from step to step: fresh pages cost as much as the transforms.
+    kept: Mutex<Vec<Vec<Complex32>>>,
     /// Squared spatial frequencies of the lattice's columns and rows, over the squared wave number.
     squares: [Vec<f32>; 2],
 }
@@ -120,7 +128,8 @@ impl<'a> Planes<'a> {
         let plan = Fft2::new(width, height);
         let offset = [left, top];
         let depths = light.middle_depths.as_deref().filter(|depths| depths.len() == light.window.len());
-        Ok(Self { targets, light, retina, viewer, depths, wavelength, panel, space, offset, plan, squares })
+        let kept = Mutex::default();
+        Ok(Self { targets, light, retina, viewer, depths, wavelength, panel, space, offset, plan, kept, squares })
     }
 
     /// Carries samples by the distance z of the angular spectrum; rows from `filled` on are dark, those from `wanted` on of no use.
@@ -128,33 +137,55 @@ impl<'a> Planes<'a> {
         let turns = (z / self.wavelength) as f32;
         let transfer = |column: usize, samples: &mut [Complex32]| {
             let along = self.squares[0][column];
-            for (u, &across) in samples.iter_mut().zip(&self.squares[1]) {
-                let square = along + across;
-                // √(1 − s) − 1 = −s/(1 + √(1 − s)), which loses no digits.
-                *u *= if square < 1.0 { phasor(-turns * (square / (1.0 + (1.0 - square).sqrt()))) } else { 0.0.into() };
+            for (samples, squares) in samples.chunks_mut(AT_ONCE).zip(self.squares[1].chunks(AT_ONCE)) {
+                let (mut re, mut im) = ([0.0; AT_ONCE], [0.0; AT_ONCE]);
+                for ((re, im), &across) in re.iter_mut().zip(&mut im).zip(squares) {
+                    let square = along + across;
+                    // √(1 − s) − 1 = −s/(1 + √(1 − s)), which loses no digits; what does not travel is left out.
+                    let travels = if square < 1.0 { 1.0 } else { 0.0 };
+                    let u = phasor(-turns * (square / (1.0 + (1.0 - square).max(0.0).sqrt())));
+                    (*re, *im) = (travels * u.re, travels * u.im);
+                }
+                samples.iter_mut().zip(re.iter().zip(&im)).for_each(|(u, (&re, &im))| *u *= Complex32::new(re, im));
             }
         };
         self.plan.filter(samples, filled, wanted, transfer, progress);
     }
 
-    fn dark(&self) -> Vec<Complex32> {
-        vec![Complex32::default(); self.space.len()]
+    /// Memory for the lattice's samples, whatever it holds.
+    fn take(&self) -> Vec<Complex32> {
+        // What is kept is memory alone, which no panic leaves in a wrong state.
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        kept.unwrap_or_else(|| zeroed(self.space.len()))
+    }
+
+    fn give_back(&self, samples: Vec<Complex32>) {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).push(samples);
+    }
+
+    /// Writes a row of the lattice, dark on both sides of the samples.
+    fn fill(line: &mut [Complex32], first: usize, count: usize, write: impl FnOnce(&mut [Complex32])) {
+        line[..first].fill(Complex32::default());
+        write(&mut line[first..first + count]);
+        line[first + count..].fill(Complex32::default());
     }
 }
 
-/// exp(i2πt) to 2e-6: of the nearest quarter's rest by Taylor's series, turned by the quarters.
-fn phasor(turns: f32) -> Complex32 {
-    let quarters = (4.0 * turns).round();
-    let x = (turns - 0.25 * quarters) * TAU as f32;
-    let s = x * x;
-    let sin = x * (1.0 + s * (-1.0 / 6.0 + s * (1.0 / 120.0 + s * (-1.0 / 5040.0))));
-    let cos = 1.0 + s * (-0.5 + s * (1.0 / 24.0 + s * (-1.0 / 720.0 + s * (1.0 / 40320.0))));
-    match (quarters as i32) & 3 {
-        0 => Complex32::new(cos, sin),
-        1 => Complex32::new(-sin, cos),
-        2 => Complex32::new(-cos, -sin),
-        _ => Complex32::new(sin, -cos),
+/// The greatest of the values at most `reach` columns and rows away.
+fn greatest_within(values: &[f32], width: usize, reach: usize) -> Vec<f32> {
+    let mut across = values.to_vec();
+    for (out, row) in across.chunks_mut(width).zip(values.chunks(width)) {
+        for by in 1..=reach.min(width - 1) {
+            out[by..].iter_mut().zip(row).for_each(|(out, v)| *out = out.max(*v));
+            out.iter_mut().zip(&row[by..]).for_each(|(out, v)| *out = out.max(*v));
+        }
     }
+    let mut both = across.clone();
+    for by in 1..=reach.min(values.len() / width - 1) {
+        both[by * width..].iter_mut().zip(&across).for_each(|(out, v)| *out = out.max(*v));
+        both.iter_mut().zip(&across[by * width..]).for_each(|(out, v)| *out = out.max(*v));
+    }
+    both
 }
 
 /// Where cell `cell` of the picture begins on the plane z, in pixels of the panel.
@@ -211,7 +242,7 @@ impl Sight for Planes<'_> {
                 let line = &mut weights[(top + row) * lattice.width + left..][..w];
                 line.iter_mut().zip(depths).for_each(|(out, &depth)| *out = weight(depth));
             }
-            weights
+            greatest_within(&weights, lattice.width, BESIDE)
         });
         Plane { depth: z, cells, amplitude, weights }
     }
@@ -227,14 +258,14 @@ impl Sight for Planes<'_> {
     fn fields(&self, looks: &[&Plane], light: Rows, progress: &Progress) -> Vec<Vec<Complex32>> {
         let (width, [left, top]) = (self.space.width, self.offset);
         let one = |plane: &&Plane| {
-            let mut samples = self.dark();
+            let mut samples = self.take();
             let filled = top + self.panel.height;
+            samples[..top * width].fill(Complex32::default());
             samples[top * width..filled * width].par_chunks_mut(width).enumerate().for_each(|(row, line)| {
-                light(row, &mut line[left..left + self.panel.width]);
+                Self::fill(line, left, self.panel.width, |samples| light(row, samples));
             });
-            let [columns, rows] = [plane.cells[0].len(), plane.cells[1].len()];
-            self.carry(&mut samples, plane.depth, filled, rows, progress);
-            samples.chunks(width).take(rows).flat_map(|line| &line[..columns]).copied().collect()
+            self.carry(&mut samples, plane.depth, filled, plane.cells[1].len(), progress);
+            samples
         };
         looks.iter().map(one).collect()
     }
@@ -242,63 +273,82 @@ impl Sight for Planes<'_> {
     fn expose(&self, plane: &Plane, field: &[Complex32], share: f32, picture: &mut [f32]) {
         let [columns, rows] = &plane.cells;
         let width = self.retina.lattice.width;
-        let mut line = vec![0.0f32; width + 1];
-        for (field, row) in field.chunks(columns.len()).zip(rows) {
-            line.fill(0.0);
-            for (u, cells) in field.iter().zip(columns) {
-                let (at, intensity) = (cells.first as usize, share * u.norm_sqr());
-                line[at] += cells.shares[0] * intensity;
-                line[at + 1] += cells.shares[1] * intensity;
+        // Rows of the picture in blocks, each with the plane's rows that show in one of them, in their order.
+        picture.par_chunks_mut(CELL_ROWS * width).enumerate().for_each(|(block, picture)| {
+            let first = block * CELL_ROWS;
+            let end = first + picture.len() / width;
+            let begin = rows.partition_point(|row| (row.first as usize + 1) < first);
+            let mut line = vec![0.0f32; width + 1];
+            for (field, row) in field.chunks(self.space.width).zip(rows).skip(begin) {
+                let cell = row.first as usize;
+                if cell >= end {
+                    break;
+                }
+                line.fill(0.0);
+                for (u, cells) in field.iter().zip(columns) {
+                    let (at, intensity) = (cells.first as usize, share * u.norm_sqr());
+                    line[at] += cells.shares[0] * intensity;
+                    line[at + 1] += cells.shares[1] * intensity;
+                }
+                for (cell, share) in [cell, cell + 1].into_iter().zip(row.shares) {
+                    if share > 0.0 && (first..end).contains(&cell) {
+                        let picture = &mut picture[(cell - first) * width..][..width];
+                        picture.iter_mut().zip(&line).for_each(|(sum, v)| *sum += share * v);
+                    }
+                }
             }
-            let first = row.first as usize * width;
-            for (picture, share) in picture[first..].chunks_mut(width).zip(row.shares) {
-                picture.iter_mut().zip(&line).for_each(|(sum, v)| *sum += share * v);
-            }
-        }
+        });
     }
 
     fn pulled(&self, plane: &Plane, mut field: Vec<Complex32>, pull: &[f32]) -> Vec<Complex32> {
         let [columns, rows] = &plane.cells;
         let width = self.retina.lattice.width;
-        field.par_chunks_mut(columns.len()).zip(rows).for_each(|(field, row)| {
-            let mut line = vec![0.0f32; width + 1];
-            let first = row.first as usize * width;
-            for (pull, share) in pull[first..].chunks(width).zip(row.shares) {
-                line.iter_mut().zip(pull).for_each(|(sum, v)| *sum += share * v);
-            }
-            for (u, cells) in field.iter_mut().zip(columns) {
-                let at = cells.first as usize;
-                *u *= cells.shares[0] * line[at] + cells.shares[1] * line[at + 1];
-            }
-        });
+        field.par_chunks_mut(self.space.width).zip(rows).for_each_init(
+            || vec![0.0f32; width + 1],
+            |line, (field, row)| {
+                line.fill(0.0);
+                let first = row.first as usize * width;
+                for (pull, share) in pull[first..].chunks(width).zip(row.shares) {
+                    line.iter_mut().zip(pull).for_each(|(sum, v)| *sum += share * v);
+                }
+                Self::fill(field, 0, columns.len(), |samples| {
+                    for (u, cells) in samples.iter_mut().zip(columns) {
+                        let at = cells.first as usize;
+                        *u *= cells.shares[0] * line[at] + cells.shares[1] * line[at + 1];
+                    }
+                });
+            },
+        );
         field
     }
 
     fn slopes<T: Send>(
         &self,
-        pulls: &[(&Plane, Vec<Complex32>)],
+        pulls: Vec<(&Plane, Vec<Complex32>)>,
         rows: &mut [T],
         take: impl Fn(usize, &mut T, &[Complex32]) + Sync,
         progress: &Progress,
     ) {
         let (width, [left, top]) = (self.space.width, self.offset);
         let wanted = top + self.panel.height;
-        let mut sum: Vec<Complex32> = Vec::new();
-        for (plane, pull) in pulls {
-            let [columns, rows] = [plane.cells[0].len(), plane.cells[1].len()];
-            let mut samples = self.dark();
-            let lines = samples.par_chunks_mut(width).zip(pull.par_chunks(columns));
-            lines.for_each(|(line, pull)| line[..columns].copy_from_slice(pull));
-            self.carry(&mut samples, -plane.depth, rows, wanted, progress);
-            if sum.is_empty() {
-                sum = samples;
-            } else {
-                sum.par_iter_mut().zip(samples).for_each(|(sum, u)| *sum += u);
-            }
-        }
+        let carried = pulls.into_iter().map(|(plane, mut samples)| {
+            self.carry(&mut samples, -plane.depth, plane.cells[1].len(), wanted, progress);
+            samples
+        });
+        let sum = carried.reduce(|mut sum, samples| {
+            sum.par_iter_mut().zip(&samples).for_each(|(sum, u)| *sum += u);
+            self.give_back(samples);
+            sum
+        });
+        let Some(sum) = sum else { return };
         rows.par_iter_mut().enumerate().for_each(|(row, state)| {
             take(row, state, &sum[(top + row) * width + left..][..self.panel.width]);
         });
+        self.give_back(sum);
+    }
+
+    fn done(&self, fields: Vec<Vec<Complex32>>) {
+        fields.into_iter().for_each(|samples| self.give_back(samples));
     }
 }
 
@@ -307,11 +357,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn phasors_are_those_of_their_turns() {
-        for turns in [0.0f32, 0.1, -0.374, 12.26, -401.7, 0.125, -0.125] {
-            let exact = crate::field::Complex64::cis(TAU * f64::from(turns));
-            let found = phasor(turns);
-            assert!((f64::from(found.re) - exact.re).hypot(f64::from(found.im) - exact.im) < 4e-6, "{turns}: {found}");
+    fn the_greatest_within_reach_is_that_of_a_square() {
+        let (width, height) = (7, 5);
+        let values: Vec<f32> = (0..width * height).map(|i| ((i * 17) % 31) as f32).collect();
+        for reach in [0, 1, 3, 9] {
+            let found = greatest_within(&values, width, reach);
+            for (i, &found) in found.iter().enumerate() {
+                let near = |j: &usize| (j % width).abs_diff(i % width).max((j / width).abs_diff(i / width)) <= reach;
+                let expected = (0..values.len()).filter(near).map(|j| values[j]).fold(0.0, f32::max);
+                assert_eq!(found, expected, "{i} within {reach}");
+            }
         }
     }
 

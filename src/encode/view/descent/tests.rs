@@ -76,7 +76,14 @@ impl<S: Sight> Slopes<'_, S> {
         let settings = Descent { iterations: 1, rate: 0.1, looks: 3, seed: 1 };
         problem.step(&mut moved, &prepared, &settings, 0).expect("step");
         let slope = |frame: &Frame| frame.moments[0].iter().map(|m| f64::from(*m) * unit).collect();
-        let slopes: Vec<Vec<f64>> = moved.iter().map(slope).collect();
+        let mut slopes: Vec<Vec<f64>> = moved.iter().map(slope).collect();
+        if self.model.blends() {
+            // The step goes by the slopes of what the panel shows.
+            for slopes in &mut slopes {
+                let shown = slopes.iter().map(|s| *s as f32).collect();
+                *slopes = self.model.pulled_back(shown).into_iter().map(f64::from).collect();
+            }
+        }
         let rms = (slopes.iter().flatten().map(|s| s * s).sum::<f64>() / (count * grid.len()) as f64).sqrt();
         // Along the slopes of all pixels, of a side of the panel, of the last frame, and of a checkerboard's fields.
         for part in 0..4 {
@@ -115,7 +122,8 @@ fn slopes_are_those_of_the_loss() {
         let (light, retina) = views(&viewer, &setup);
         let model = PanelModel::new(&setup.profile, WAVELENGTH, Illumination::Normal).expect("model");
         let optics = Optics::new(&setup.grid, &retina, WAVELENGTH);
-        let targets = Targets::new(&retina, &light, WAVELENGTH).expect("targets");
+        let progress = Progress::new();
+        let targets = Targets::new(&retina, &light, WAVELENGTH, &progress).expect("targets");
         let sight = Pupils { optics: &optics, targets: &targets };
         let looks = three_looks(&viewer);
         let slopes = Slopes { sight: &sight, model: &model, viewer: &viewer, looks, least };
@@ -129,7 +137,8 @@ fn slopes_of_planes_are_those_of_the_loss() {
         let (viewer, setup) = (Viewer { pupil: Pupil::All, ..viewer(DVec2::ZERO) }, setup(16, 0.95, 0.0));
         let (light, retina) = views(&viewer, &setup);
         let model = PanelModel::new(&setup.profile, WAVELENGTH, Illumination::Normal).expect("model");
-        let targets = Targets::new(&retina, &light, WAVELENGTH).expect("targets");
+        let progress = Progress::new();
+        let targets = Targets::new(&retina, &light, WAVELENGTH, &progress).expect("targets");
         let target =
             ViewTarget { light: &light, viewer: &viewer, retina: &retina, setup: &setup, wavelength: WAVELENGTH };
         let planes = Planes::new(&targets, &target).expect("planes");
