@@ -33,6 +33,8 @@ pub(crate) struct Vertex {
     pub(crate) position: DVec3,
     /// Unit shading normal.
     pub(crate) normal: DVec3,
+    /// The thing that it is part of.
+    pub(super) instance: u32,
     /// Sum of the geometric normals of its elements.
     pub(super) facing: DVec3,
     /// Sum of its elements' middles, and their number.
@@ -46,10 +48,11 @@ pub(crate) struct Vertex {
 
 impl Vertex {
     /// Where rays of this vertex start: off the surface, and a little towards the middle of its elements, so that a
-    /// vertex on an edge between two walls looks along neither of them.
+    /// vertex on an edge between two walls looks along neither of them; not into a body that is round there.
     pub(crate) fn origin(&self, offset: f64) -> DVec3 {
-        let middle = self.middles / self.count.max(1.0);
-        self.position.lerp(middle, DRAWN_IN) + self.facing() * offset
+        let facing = self.facing();
+        let towards = (self.middles / self.count.max(1.0) - self.position) * DRAWN_IN;
+        self.position + towards + facing * (offset - towards.dot(facing).min(0.0))
     }
     /// Where its light is measured.
     pub(crate) fn shading_point(&self, offset: f64) -> ShadingPoint {
@@ -58,6 +61,32 @@ impl Vertex {
     /// Unit geometric normal, averaged over its elements.
     pub(crate) fn facing(&self) -> DVec3 {
         self.facing.normalize_or(self.normal)
+    }
+}
+
+/// Vertices of one thing that stand in one place and face about the same way, as those of flat triangles that meet there do.
+pub(crate) struct Sites {
+    /// A vertex of each.
+    pub(crate) first: Vec<u32>,
+    /// The site of each vertex.
+    pub(crate) of: Vec<u32>,
+}
+
+impl Sites {
+    /// Sites of vertices; those inside bodies are apart from others.
+    pub(crate) fn new(vertices: &[Vertex]) -> Self {
+        let mut known = HashMap::with_capacity(vertices.len() / 2);
+        let (mut first, mut of) = (Vec::new(), Vec::with_capacity(vertices.len()));
+        for (index, vertex) in vertices.iter().enumerate() {
+            let place = (vertex.position + DVec3::ZERO).to_array().map(f64::to_bits);
+            let way = vertex.normal.to_array().map(|n| (n * 4.0).round() as i8);
+            let site = *known.entry((place, way, vertex.instance, vertex.buried)).or_insert_with(|| {
+                first.push(index as u32);
+                first.len() as u32 - 1
+            });
+            of.push(site);
+        }
+        Self { first, of }
     }
 }
 

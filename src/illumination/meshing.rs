@@ -1,6 +1,6 @@
 //! Making the mesh: sides of triangles are bisected as finely as the nearness of their surroundings asks for.
 
-use super::elements::{DRAWN_IN, Element, Elements, LIFT, NONE, Node, Vertex, rotated};
+use super::elements::{DRAWN_IN, Element, Elements, LIFT, NONE, Node, Sites, Vertex, rotated};
 use super::sampling::hemisphere;
 use crate::random::Random;
 use crate::scene::bvh::{Ray, SceneBvh, Sides};
@@ -8,8 +8,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// Rays that measure how near the surroundings of a vertex are.
+/// Rays, squared, that measure how near the surroundings of a vertex are, and those that only tell whether it stands in a body.
 const PROBE_SIDE: usize = 6;
+const BODY_SIDE: usize = 4;
 /// A vertex that sees hardly anything but the backs of one-sided surfaces stands inside a body.
 const BURIED: f32 = 0.9;
 
@@ -51,7 +52,7 @@ impl Elements {
         mesh.split_where(fineness, |mesh, e| mesh.longest_edge(e) > fineness.longest);
         let mut probed = 0;
         loop {
-            mesh.probe(bvh, probed, seed);
+            mesh.probe(bvh, probed, fineness.shortest, seed);
             probed = mesh.vertices.len();
             let split = mesh.split_where_once(fineness, |mesh, e| {
                 let near = mesh.elements[e].corners.iter().map(|&v| mesh.vertices[v as usize].nearness);
@@ -99,6 +100,7 @@ impl Elements {
             vertices.push(Vertex {
                 position,
                 normal,
+                instance,
                 facing: DVec3::ZERO,
                 middles: DVec3::ZERO,
                 count: 0.0,
@@ -180,13 +182,34 @@ impl Elements {
         self.nodes[e as usize] = Node { children: first, rotations };
     }
 
-    /// Measures how near the surroundings of the vertices from `from` on are.
-    fn probe(&mut self, bvh: &SceneBvh, from: usize, seed: u64) {
-        self.vertices[from..].par_iter_mut().enumerate().for_each(|(k, vertex)| {
-            let mut random = Random::new(seed, (from + k) as u64);
+    /// Measures how near the surroundings of the vertices from `from` on are, where their elements may be split, and whether they
+    /// stand in bodies, where there are some.
+    fn probe(&mut self, bvh: &SceneBvh, from: usize, shortest: f64, seed: u64) {
+        let mut longest = vec![0.0f64; self.vertices.len()];
+        for e in self.leaves() {
+            let edge = self.longest_edge(e as usize);
+            for v in self.elements[e as usize].corners {
+                longest[v as usize] = longest[v as usize].max(edge);
+            }
+        }
+        let has_bodies = self.scene.materials.iter().any(|material| !material.double_sided);
+        let vertices = &self.vertices[from..];
+        let sites = Sites::new(vertices);
+        let mut edges = vec![0.0f64; sites.first.len()];
+        for (&site, &edge) in sites.of.iter().zip(&longest[from..]) {
+            edges[site as usize] = edges[site as usize].max(edge);
+        }
+        let look = |(&first, &edge): (&u32, &f64)| {
+            let side = match (edge > shortest, has_bodies) {
+                (true, _) => PROBE_SIDE,
+                (false, true) => BODY_SIDE,
+                (false, false) => return (f32::INFINITY, false),
+            };
+            let vertex = &vertices[first as usize];
+            let mut random = Random::new(seed, from as u64 + u64::from(first));
             let (facing, origin) = (vertex.facing(), vertex.origin(bvh.offset()));
             let (mut inverse, mut rays, mut backs) = (0.0, 0.0f32, 0.0);
-            for direction in hemisphere(vertex.normal, PROBE_SIDE, &mut random) {
+            for direction in hemisphere(vertex.normal, side, &mut random) {
                 if direction.dot(facing) <= 0.0 {
                     continue;
                 }
@@ -197,9 +220,12 @@ impl Elements {
                     backs += if !hit.front && one_sided { 1.0 } else { 0.0 };
                 }
             }
-            vertex.nearness = if inverse > 0.0 { rays / inverse } else { f32::INFINITY };
-            vertex.buried = rays > 0.0 && backs > BURIED * rays;
-        });
+            (if inverse > 0.0 { rays / inverse } else { f32::INFINITY }, rays > 0.0 && backs > BURIED * rays)
+        };
+        let found: Vec<(f32, bool)> = sites.first.par_iter().zip(&edges).map(look).collect();
+        for (vertex, &site) in self.vertices[from..].iter_mut().zip(&sites.of) {
+            (vertex.nearness, vertex.buried) = found[site as usize];
+        }
     }
 
     /// Finds the leaves that something cuts through or borders on, or that reach into a body.

@@ -44,6 +44,7 @@ mod meshing;
 mod patches;
 pub(crate) mod paths;
 mod photons;
+mod probes;
 mod radiosity;
 pub(crate) mod reflection;
 mod sampling;
@@ -77,7 +78,8 @@ use lamp_image::Lamps;
 use meshing::Fineness;
 use patches::{Found, Patches};
 use paths::Optics;
-use radiosity::{Surroundings, Transport};
+use probes::Probes;
+use radiosity::{GatheringRays, Surroundings, Transport};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
@@ -193,8 +195,10 @@ pub struct IlluminationReport {
     pub seconds: f64,
 }
 
-/// Most gathering rays in all: vertices beyond some tens of thousands lie so close that the noise of each counts less.
-const MOST_GATHERING_RAYS: usize = 8_000_000;
+/// Most gathering rays in all: probes beyond some tens of thousands lie so close that the noise of each counts less.
+const MOST_GATHERING_RAYS: usize = 4_000_000;
+/// Distance within which vertices share gathering rays, over the shortest edge that is split.
+const PROBES_APART: f64 = 0.5;
 /// Vertices at which images of lamps are compared.
 const MOST_PLACES: usize = 400;
 
@@ -259,10 +263,14 @@ impl Illumination {
         let mut sky = sky::at_vertices(&optics, &mesh, settings.seed ^ 0x5c1, progress)?;
         let caustics = Caustics::new(&bvh, &photons);
         progress.check()?;
-        let most = (MOST_GATHERING_RAYS / mesh.vertices.len().max(1)) as f64;
-        let side = f64::from(settings.indirect_rays).min(most).sqrt().floor().max(4.0) as usize;
+        let probes = Probes::new(&bvh, &mesh, PROBES_APART * fineness.shortest);
         let surroundings = Surroundings { mesh: &mesh, senders: &senders, optics: &optics };
-        let transport = Transport::cast(&surroundings, side, settings.seed ^ 0x6a7, progress)?;
+        let rays = GatheringRays { each: settings.indirect_rays as usize, together: MOST_GATHERING_RAYS };
+        let shines = |s: u32| {
+            let own = patches.direct[s as usize] + patches.emission[s as usize];
+            (own + mesh.mean_over(senders.all[s as usize], &sky)).max_element() > 0.0
+        };
+        let transport = Transport::cast(&surroundings, &probes, rays, shines, settings.seed ^ 0x6a7, progress)?;
         let scale = settings.form_factor.scale() as f32;
         sky.iter_mut().zip(transport.beyond()).for_each(|(sky, beyond)| *sky = (*sky + *beyond) * scale);
         for (direct, &sender) in patches.direct.iter_mut().zip(&senders.all) {
@@ -279,6 +287,7 @@ impl Illumination {
         let reflected = bounce(&irradiance);
         let leaving: Vec<Vec3> = source.iter().zip(&reflected).map(|(s, r)| *s + *r).collect();
         let found = Found { leaving: &leaving, irradiance: &irradiance, sky: &sky };
+        let gathering_rays = transport.rays();
         let energy = patches.energy(&surroundings, &emitters, &transport, found, settings.seed);
         let irradiance = irradiance.iter().zip(&weak).zip(&sky).map(|((i, w), s)| *i + *w + *s).collect();
         let mut light = Self {
@@ -298,7 +307,7 @@ impl Illumination {
             emitters: light.emitters.polygons.len(),
             patches: light.mesh.leaves().count(),
             vertices: light.mesh.vertices.len(),
-            gathering_rays: (light.mesh.vertices.len() * side * side) as u64,
+            gathering_rays,
             convergence,
             lamp_images: light.images.len(),
             photons: photons.len(),

@@ -9,8 +9,9 @@
 //! The linear system x = Kρ(E + x)/π is solved to a stated residual by minimal residuals over conjugate directions
 //! (GCR, Eisenstat, Elman & Schultz 1983), each colour for itself.
 
-use super::elements::{Elements, NONE, Senders};
+use super::elements::{Elements, Senders, Vertex};
 use super::paths::{Continuation, Optics, Way};
+use super::probes::Probes;
 use super::sampling::hemisphere;
 use crate::error::Result;
 use crate::progress::Progress;
@@ -34,9 +35,6 @@ pub(crate) enum RayEnd {
         bent: bool,
     },
 }
-
-/// The ray brings nothing, or by way of optics: what it brings then stands in the vertex' list.
-const BLACK: u32 = NONE;
 
 /// The surfaces that gathering rays meet.
 #[derive(Clone, Copy)]
@@ -78,100 +76,106 @@ impl Surroundings<'_> {
     }
 }
 
+/// How many rays gather.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GatheringRays {
+    /// From each probe, where there are few.
+    pub(crate) each: usize,
+    /// From all probes together, at most.
+    pub(crate) together: usize,
+}
+
 /// The sampled transport from senders to vertices.
-pub(crate) struct Transport {
-    /// Rays per vertex.
-    rays: usize,
-    /// For each vertex and ray the number of the sender.
-    ends: Vec<u32>,
-    tinted: Vec<Vec<(u32, Vec3)>>,
-    /// Rays of each vertex that count (those above its horizon).
-    counted: Vec<f32>,
+pub(crate) struct Transport<'a> {
+    probes: &'a Probes,
+    /// What each probe has found.
+    found: Vec<Gathered>,
     /// Means over each vertex' rays of what the environment sends by way of mirrors and glass.
     beyond: Vec<Vec3>,
     /// Parts of each vertex' light that escape, and that end on black or in optics.
     losses: Vec<(Vec3, Vec3)>,
 }
 
-/// What one vertex found beside the senders that it sees plainly.
+/// What one probe has found.
 #[derive(Default)]
-struct VertexGather {
+struct Gathered {
+    /// The senders that it sees plainly, one for each ray that ends on one.
+    plain: Vec<u32>,
     tinted: Vec<(u32, Vec3)>,
+    /// Rays that count: those above its horizon.
     counted: f32,
     escaped: Vec3,
     absorbed: Vec3,
     beyond: Vec3,
 }
 
-impl Transport {
-    /// Casts `side`² rays from each vertex.
-    pub(crate) fn cast(around: &Surroundings, side: usize, seed: u64, progress: &Progress) -> Result<Self> {
-        let (bvh, mesh) = (&around.optics.bvh, around.mesh);
-        let rays = side * side;
-        let mut ends = vec![BLACK; mesh.vertices.len() * rays];
-        progress.start("gathering indirect light", mesh.vertices.len() as u64);
-        let found: Vec<VertexGather> = ends
-            .par_chunks_mut(rays.max(1))
-            .zip(&mesh.vertices)
-            .enumerate()
-            .map(|(index, (ends, vertex))| {
-                progress.advance(1);
-                let mut found = VertexGather::default();
-                if vertex.buried || progress.stopped() {
-                    found.counted = rays as f32;
-                    found.absorbed = Vec3::splat(found.counted);
-                    return found;
-                }
-                let mut random = Random::new(seed, index as u64);
-                let (facing, origin) = (vertex.facing(), vertex.origin(bvh.offset()));
-                let directions: Vec<DVec3> = hemisphere(vertex.normal, side, &mut random).collect();
-                let mut random = Random::new(seed ^ 0x5bd1, index as u64);
-                for (end, direction) in ends.iter_mut().zip(directions) {
-                    if direction.dot(facing) <= 0.0 {
-                        continue;
-                    }
-                    found.counted += 1.0;
-                    let (reached, tint) = around.follow(Ray { origin, direction }, &mut random);
-                    let left = if reached == RayEnd::Black { Vec3::ZERO } else { tint };
-                    found.absorbed += Vec3::ONE - left;
-                    *end = match reached {
-                        RayEnd::Escaped { direction, bent } => {
-                            found.escaped += tint;
-                            if bent && let Some(around) = &around.optics.scene().environment {
-                                found.beyond += tint * around.smooth(direction);
-                            }
-                            BLACK
-                        }
-                        RayEnd::Black => BLACK,
-                        RayEnd::Sender(sender) if tint == Vec3::ONE => sender,
-                        RayEnd::Sender(sender) => {
-                            found.tinted.push((sender, tint));
-                            BLACK
-                        }
-                    };
-                }
-                found
-            })
-            .collect();
+/// Probes from which it is worth to find out whether any light comes their way before they look well.
+const MANY: usize = 10_000;
+/// Rays by which that is found out, squared.
+const FIRST_SIDE: usize = 4;
+
+impl<'a> Transport<'a> {
+    /// Casts rays from each probe; few from those that no light reaches, as inside closed bodies. `shines` tells which senders
+    /// send light before any comes from other surfaces.
+    pub(crate) fn cast(
+        around: &Surroundings,
+        probes: &'a Probes,
+        rays: GatheringRays,
+        shines: impl Fn(u32) -> bool + Sync,
+        seed: u64,
+        progress: &Progress,
+    ) -> Result<Self> {
+        let count = probes.at.len();
+        progress.start("gathering indirect light", count as u64);
+        let mut found: Vec<Gathered> = Vec::new();
+        let lit = if count > MANY {
+            let look = |&at: &u32| Gathered::new(around, at, FIRST_SIDE, seed ^ 0xf125, progress);
+            found = probes.at.par_iter().map(look).collect();
+            progress.check()?;
+            lit(around, probes, &found, shines)
+        } else {
+            vec![true; count]
+        };
+        let most = rays.together as f64 / lit.iter().filter(|lit| **lit).count().max(1) as f64;
+        let side = (rays.each as f64).min(most).sqrt().floor().max(4.0) as usize;
+        let look = |(place, &lit): (usize, &bool)| {
+            progress.advance(1);
+            lit.then(|| Gathered::new(around, probes.at[place], side, seed, progress))
+        };
+        let closer: Vec<Option<Gathered>> = lit.par_iter().enumerate().map(look).collect();
         progress.check()?;
-        let losses = found.iter().map(|f| (f.escaped / f.counted.max(1.0), f.absorbed / f.counted.max(1.0))).collect();
-        let beyond = found.iter().map(|f| f.beyond / f.counted.max(1.0)).collect();
-        let (tinted, counted) = found.into_iter().map(|f| (f.tinted, f.counted)).unzip();
-        Ok(Self { rays, ends, tinted, counted, beyond, losses })
+        found.resize_with(count, Gathered::default);
+        for (found, closer) in found.iter_mut().zip(closer) {
+            if let Some(closer) = closer {
+                *found = closer;
+            } else {
+                // What it sees sends nothing.
+                (found.plain, found.tinted) = (Vec::new(), Vec::new());
+            }
+        }
+        let spread = |of: fn(&Gathered) -> Vec3| {
+            probes.spread(&found.iter().map(|f| of(f) / f.counted.max(1.0)).collect::<Vec<_>>())
+        };
+        let (escaped, absorbed, beyond) = (spread(|f| f.escaped), spread(|f| f.absorbed), spread(|f| f.beyond));
+        // What a body buries sends its light into it.
+        let all = |(vertex, loss): (&Vertex, (Vec3, Vec3))| if vertex.buried { (Vec3::ZERO, Vec3::ONE) } else { loss };
+        let losses = around.mesh.vertices.iter().zip(escaped.into_iter().zip(absorbed)).map(all).collect();
+        Ok(Self { probes, found, beyond, losses })
     }
 
     /// Mean of the senders' radiance over each vertex' rays: its irradiance over π.
     pub(crate) fn gather(&self, radiance: &[Vec3], scale: f32) -> Vec<Vec3> {
-        self.ends
-            .par_chunks(self.rays.max(1))
-            .zip(&self.tinted)
-            .zip(&self.counted)
-            .map(|((ends, tinted), &counted)| {
-                let plain: Vec3 = ends.iter().filter(|&&e| e != BLACK).map(|&e| radiance[e as usize]).sum();
-                let tinted: Vec3 = tinted.iter().map(|&(e, weight)| radiance[e as usize] * weight).sum();
-                (plain + tinted) * (scale / counted.max(1.0))
-            })
-            .collect()
+        let one = |found: &Gathered| {
+            let plain: Vec3 = found.plain.iter().map(|&e| radiance[e as usize]).sum();
+            let tinted: Vec3 = found.tinted.iter().map(|&(e, weight)| radiance[e as usize] * weight).sum();
+            (plain + tinted) * (scale / found.counted.max(1.0))
+        };
+        self.probes.spread(&self.found.par_iter().map(one).collect::<Vec<_>>())
+    }
+
+    /// Rays that count.
+    pub(crate) fn rays(&self) -> u64 {
+        self.found.iter().map(|found| found.counted as u64).sum()
     }
 
     /// Irradiance over π at the vertices that comes from the environment by way of mirrors and glass.
@@ -182,6 +186,65 @@ impl Transport {
     /// Parts of a vertex' light that escape, and that end on black or in optics.
     pub(crate) fn losses(&self, vertex: usize) -> (Vec3, Vec3) {
         self.losses[vertex]
+    }
+}
+
+impl Gathered {
+    /// What a vertex finds by `side`² rays.
+    fn new(around: &Surroundings, at: u32, side: usize, seed: u64, progress: &Progress) -> Self {
+        let (bvh, vertex) = (&around.optics.bvh, &around.mesh.vertices[at as usize]);
+        let mut found = Self::default();
+        if progress.stopped() {
+            return found;
+        }
+        let mut random = Random::new(seed, u64::from(at));
+        let (facing, origin) = (vertex.facing(), vertex.origin(bvh.offset()));
+        let directions: Vec<DVec3> = hemisphere(vertex.normal, side, &mut random).collect();
+        let mut random = Random::new(seed ^ 0x5bd1, u64::from(at));
+        for direction in directions {
+            if direction.dot(facing) <= 0.0 {
+                continue;
+            }
+            found.counted += 1.0;
+            let (reached, tint) = around.follow(Ray { origin, direction }, &mut random);
+            let left = if reached == RayEnd::Black { Vec3::ZERO } else { tint };
+            found.absorbed += Vec3::ONE - left;
+            match reached {
+                RayEnd::Escaped { direction, bent } => {
+                    found.escaped += tint;
+                    if bent && let Some(around) = &around.optics.scene().environment {
+                        found.beyond += tint * around.smooth(direction);
+                    }
+                }
+                RayEnd::Black => {}
+                RayEnd::Sender(sender) if tint == Vec3::ONE => found.plain.push(sender),
+                RayEnd::Sender(sender) => found.tinted.push((sender, tint)),
+            }
+        }
+        found.plain.shrink_to_fit();
+        found
+    }
+}
+
+/// Which probes light reaches, by the few rays that all of them have cast: those that see something that shines, or that is lit by
+/// what such a probe is lit by.
+fn lit(around: &Surroundings, probes: &Probes, found: &[Gathered], shines: impl Fn(u32) -> bool + Sync) -> Vec<bool> {
+    let sees = |found: &Gathered, of: &(dyn Fn(u32) -> bool + Sync)| {
+        found.plain.iter().copied().chain(found.tinted.iter().map(|(sender, _)| *sender)).any(of)
+    };
+    let first = |found: &Gathered| found.beyond != Vec3::ZERO || sees(found, &shines);
+    let mut lit: Vec<bool> = found.par_iter().map(first).collect();
+    loop {
+        let is_lit = |sender: u32| {
+            let element = around.senders.all[sender as usize].element;
+            let corners = around.mesh.elements[element as usize].corners;
+            corners.iter().any(|&v| probes.of(v).any(|probe| lit[probe as usize]))
+        };
+        let next: Vec<bool> = lit.par_iter().zip(found).map(|(lit, found)| *lit || sees(found, &is_lit)).collect();
+        if next == lit {
+            return lit;
+        }
+        lit = next;
     }
 }
 

@@ -267,3 +267,44 @@ fn settings_outside_their_domain_are_refused() {
     assert!(refused(IlluminationSettings { shortest_element: 0.5, ..good }));
     assert!(!refused(good), "an empty scene is dark, not wrong");
 }
+
+#[test]
+fn a_closed_body_of_many_triangles_is_lit_on_the_side_where_there_is_light() {
+    // An integrating sphere: a point light of intensity I in its middle gives I/R², and all bounces 1/(1 − ρ) times as much.
+    let (radius, intensity, rho) = (0.5, 2.0, 0.5);
+    let scene = |place: DVec3| {
+        let mut room = Room::default();
+        let material = room.material(Material { double_sided: true, ..Material::diffuse(Vec3::splat(rho as f32)) });
+        room.sphere(DVec3::ZERO, radius, false, 110, material);
+        room.scene.lights.push(PunctualLight {
+            kind: LightKind::Point,
+            position: place.as_vec3(),
+            direction: Vec3::NEG_Z,
+            intensity: Vec3::splat(intensity as f32),
+            range: f32::INFINITY,
+        });
+        room.scene
+    };
+    let inside = lit(&scene(DVec3::ZERO), IlluminationSettings::default());
+    let seen_from = |light: &Illumination, origin: DVec3, direction: DVec3| {
+        let hit = light.bvh().nearest(&Ray { origin, direction }, 0.0, Sides::Both).expect("sphere");
+        let surface = Surface::at(light.bvh().scene(), &hit, 0.0);
+        light.radiance(&hit, &surface, 1, &mut Random::new(9, 1)).y
+    };
+    let expected = rho / PI * intensity / (radius * radius) / (1.0 - rho);
+    let mut random = Random::new(3, 3);
+    for _ in 0..40 {
+        let direction = DVec3::from_array(std::array::from_fn(|_| random.uniform() - 0.5)).normalize();
+        let found = f64::from(seen_from(&inside, DVec3::ZERO, direction));
+        assert!((found / expected - 1.0).abs() < 0.01, "{found}, not {expected}, towards {direction}");
+        assert_eq!(seen_from(&inside, direction, -direction), 0.0, "outside it is dark");
+    }
+    let balance = inside.report().energy.imbalance();
+    assert!(balance.abs() < 3e-3, "{balance}");
+    // Half of the sphere's sides look where there is no light: they are found out by few rays.
+    let outside = lit(&scene(DVec3::new(0.0, 2.0, 0.0)), IlluminationSettings::default());
+    assert_eq!(seen_from(&outside, DVec3::ZERO, DVec3::Y), 0.0, "inside it is dark");
+    assert!(outside.report().gathering_rays < 1_000_000, "{:?}", outside.report());
+    let direct = rho / PI * intensity / 1.5f64.powi(2);
+    assert!((f64::from(seen_from(&outside, DVec3::Y, DVec3::NEG_Y)) / direct - 1.0).abs() < 0.01);
+}
