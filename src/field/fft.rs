@@ -88,9 +88,14 @@ pub(crate) fn fast_length(least: usize, step: usize, others: &[usize]) -> usize 
     (least.div_ceil(step).max(1)..).find(is_fast).map_or(least, |m| step * m)
 }
 
-/// Columns that one task transforms together: 16 columns of complex f32 are two cache lines a row, and with their transforms fit
-/// a second-level cache.
-const STRIP: usize = 16;
+/// Columns that one task transforms together: four cache lines a row, so that few pages are opened for much of each, and with
+/// their transforms within a second-level cache.
+const fn strip_width<T>() -> usize {
+    256 / size_of::<Complex<T>>()
+}
+
+/// Rows that one task transforms together.
+const ROWS: usize = 16;
 
 /// A planned transform of one size, forward and inverse, usable from any number of threads.
 ///
@@ -182,7 +187,7 @@ impl<T: FftNum> Fft2<T> {
         assert_eq!(samples.len(), self.width * self.height, "samples fit the planned size");
         let rows = &mut samples[..rows * self.width];
         // A task of several rows amortises its scratch; the split does not change any row's result.
-        rows.par_chunks_mut(self.width * STRIP).for_each_init(
+        rows.par_chunks_mut(self.width * ROWS).for_each_init(
             || self.row.scratch(),
             |scratch, rows| {
                 if !progress.stopped() {
@@ -207,19 +212,19 @@ impl<T: FftNum> Fft2<T> {
         }
         let rows = filled.max(wanted);
         let mut strips: Vec<Vec<&mut [Complex<T>]>> = Vec::new();
-        strips.resize_with(self.width.div_ceil(STRIP), || Vec::with_capacity(rows));
+        strips.resize_with(self.width.div_ceil(strip_width::<T>()), || Vec::with_capacity(rows));
         for row in samples.chunks_mut(self.width).take(rows) {
-            strips.iter_mut().zip(row.chunks_mut(STRIP)).for_each(|(strip, piece)| strip.push(piece));
+            strips.iter_mut().zip(row.chunks_mut(strip_width::<T>())).for_each(|(strip, piece)| strip.push(piece));
         }
         strips.into_par_iter().enumerate().for_each_init(
-            || (Fft1::dark(height * STRIP), self.column.scratch()),
+            || (Fft1::dark(height * strip_width::<T>()), self.column.scratch()),
             |(columns, scratch), (number, mut strip)| {
                 if progress.stopped() {
                     return;
                 }
                 let columns = &mut columns[..strip.first().map_or(0, |piece| piece.len()) * height];
                 gather(&strip[..filled], columns, height);
-                work(self, number * STRIP, columns, scratch);
+                work(self, number * strip_width::<T>(), columns, scratch);
                 scatter(columns, &mut strip[..wanted], height);
             },
         );
@@ -231,24 +236,36 @@ const TURNED: usize = 8;
 
 /// Writes pieces of rows as the beginnings of columns of `height` samples, the rest zero.
 fn gather<T: FftNum>(rows: &[&mut [Complex<T>]], columns: &mut [Complex<T>], height: usize) {
+    let count = columns.len() / height;
     for column in columns.chunks_exact_mut(height) {
         column[rows.len()..].fill(Complex::new(T::zero(), T::zero()));
     }
-    for (block, rows) in rows.chunks(TURNED).enumerate() {
-        for (i, column) in columns.chunks_exact_mut(height).enumerate() {
-            let column = &mut column[block * TURNED..][..rows.len()];
-            column.iter_mut().zip(rows).for_each(|(u, row)| *u = row[i]);
+    let (blocks, rest) = rows.as_chunks::<TURNED>();
+    for (block, rows) in blocks.iter().enumerate() {
+        let rows = rows.each_ref().map(|row| &row[..count]);
+        for i in 0..count {
+            let column = &mut columns[i * height + block * TURNED..][..TURNED];
+            column.iter_mut().zip(&rows).for_each(|(u, row)| *u = row[i]);
         }
+    }
+    for (row, line) in (rows.len() - rest.len()..).zip(rest) {
+        line.iter().enumerate().for_each(|(i, &u)| columns[i * height + row] = u);
     }
 }
 
 /// Writes the beginnings of columns of `height` samples back into the rows.
 fn scatter<T: FftNum>(columns: &[Complex<T>], rows: &mut [&mut [Complex<T>]], height: usize) {
-    for (block, rows) in rows.chunks_mut(TURNED).enumerate() {
-        for (i, column) in columns.chunks_exact(height).enumerate() {
-            let column = &column[block * TURNED..][..rows.len()];
+    let (count, all) = (columns.len() / height, rows.len());
+    let (blocks, rest) = rows.as_chunks_mut::<TURNED>();
+    for (block, rows) in blocks.iter_mut().enumerate() {
+        let mut rows = rows.each_mut().map(|row| &mut row[..count]);
+        for i in 0..count {
+            let column = &columns[i * height + block * TURNED..][..TURNED];
             rows.iter_mut().zip(column).for_each(|(row, &u)| row[i] = u);
         }
+    }
+    for (row, line) in (all - rest.len()..).zip(rest) {
+        line.iter_mut().enumerate().for_each(|(i, u)| *u = columns[i * height + row]);
     }
 }
 
@@ -361,7 +378,7 @@ mod tests {
         };
         pool.install(|| plan.filter(&mut u, height, height, count, &progress));
         let columns = columns.into_inner();
-        assert!((3..=3 * STRIP).contains(&columns), "{columns} columns of {width}");
+        assert!((3..=3 * strip_width::<f64>()).contains(&columns), "{columns} columns of {width}");
         // Asked before: nothing is done.
         let before = u.clone();
         plan.forward(&mut u, &progress);
