@@ -48,8 +48,12 @@ pub(crate) struct Emitter {
 impl Emitter {
     /// Flux [W], all sides.
     pub(crate) fn flux(&self) -> Vec3 {
-        let sides = if self.two_sided { 2.0 } else { 1.0 };
-        self.mean_radiance * (self.area * PI * sides) as f32
+        self.mean_radiance * (self.area_of_sides() * PI) as f32
+    }
+
+    /// Area of all sides that shine [m²].
+    pub(crate) fn area_of_sides(&self) -> f64 {
+        if self.two_sided { 2.0 * self.area } else { self.area }
     }
 
     /// A point of the polygon from the unit square, uniform in area.

@@ -2,6 +2,8 @@
 
 use super::elements::{DRAWN_IN, Element, Elements, LIFT, NONE, Node, Sites, Vertex, rotated};
 use super::sampling::hemisphere;
+use crate::error::Result;
+use crate::progress::Progress;
 use crate::random::Random;
 use crate::scene::bvh::{Ray, SceneBvh, Sides};
 use glam::DVec3;
@@ -29,7 +31,16 @@ pub(crate) struct Fineness {
 
 impl Elements {
     /// Meshes every side for which `lit(triangle, front)` holds and refines it round by round.
-    pub(crate) fn new(bvh: &SceneBvh, fineness: Fineness, seed: u64, lit: impl Fn(u32, bool) -> bool) -> Self {
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Interrupted`] when asked to stop.
+    pub(crate) fn new(
+        bvh: &SceneBvh,
+        fineness: Fineness,
+        seed: u64,
+        lit: impl Fn(u32, bool) -> bool,
+        progress: &Progress,
+    ) -> Result<Self> {
         let scene = bvh.scene();
         let mut mesh = Self {
             scene: scene.clone(),
@@ -41,6 +52,7 @@ impl Elements {
             shared: HashMap::new(),
         };
         for index in 0..scene.triangles.len() as u32 {
+            progress.check()?;
             for front in [true, false] {
                 let triangle = &scene.triangles[index as usize];
                 let real = triangle.area() > 0.0 && triangle.positions.iter().all(|p| p.is_finite());
@@ -52,7 +64,7 @@ impl Elements {
         mesh.split_where(fineness, |mesh, e| mesh.longest_edge(e) > fineness.longest);
         let mut probed = 0;
         loop {
-            mesh.probe(bvh, probed, fineness.shortest, seed);
+            mesh.probe(bvh, probed, fineness.shortest, seed, progress)?;
             probed = mesh.vertices.len();
             let split = mesh.split_where_once(fineness, |mesh, e| {
                 let near = mesh.elements[e].corners.iter().map(|&v| mesh.vertices[v as usize].nearness);
@@ -64,9 +76,9 @@ impl Elements {
                 break;
             }
         }
-        mesh.mark_cut(bvh);
+        mesh.mark_cut(bvh, progress)?;
         mesh.shared = HashMap::new();
-        mesh
+        Ok(mesh)
     }
 
     fn add_root(&mut self, index: u32, front: bool) {
@@ -184,7 +196,7 @@ impl Elements {
 
     /// Measures how near the surroundings of the vertices from `from` on are, where their elements may be split, and whether they
     /// stand in bodies, where there are some.
-    fn probe(&mut self, bvh: &SceneBvh, from: usize, shortest: f64, seed: u64) {
+    fn probe(&mut self, bvh: &SceneBvh, from: usize, shortest: f64, seed: u64, progress: &Progress) -> Result<()> {
         let mut longest = vec![0.0f64; self.vertices.len()];
         for e in self.leaves() {
             let edge = self.longest_edge(e as usize);
@@ -205,6 +217,9 @@ impl Elements {
                 (false, true) => BODY_SIDE,
                 (false, false) => return (f32::INFINITY, false),
             };
+            if progress.stopped() {
+                return (f32::INFINITY, false);
+            }
             let vertex = &vertices[first as usize];
             let mut random = Random::new(seed, from as u64 + u64::from(first));
             let (facing, origin) = (vertex.facing(), vertex.origin(bvh.offset()));
@@ -226,10 +241,11 @@ impl Elements {
         for (vertex, &site) in self.vertices[from..].iter_mut().zip(&sites.of) {
             (vertex.nearness, vertex.buried) = found[site as usize];
         }
+        progress.check()
     }
 
     /// Finds the leaves that something cuts through or borders on, or that reach into a body.
-    fn mark_cut(&mut self, bvh: &SceneBvh) {
+    fn mark_cut(&mut self, bvh: &SceneBvh, progress: &Progress) -> Result<()> {
         let leaves: Vec<u32> = self.leaves().collect();
         let mut around: Vec<Vec<u32>> = vec![Vec::new(); self.vertices.len()];
         for &e in &leaves {
@@ -259,7 +275,9 @@ impl Elements {
             .par_iter()
             .map(|&e| {
                 let element = &self.elements[e as usize];
-                if element.corners.iter().any(|&v| self.vertices[v as usize].buried || torn[v as usize]) {
+                if progress.stopped()
+                    || element.corners.iter().any(|&v| self.vertices[v as usize].buried || torn[v as usize])
+                {
                     return true;
                 }
                 let corners = self.corners(e as usize);
@@ -273,5 +291,6 @@ impl Elements {
         for (&e, cut) in leaves.iter().zip(cut) {
             self.elements[e as usize].cut = cut;
         }
+        progress.check()
     }
 }

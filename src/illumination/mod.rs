@@ -241,11 +241,12 @@ impl Illumination {
             most_vertices: settings.most_vertices,
         };
         progress.start("meshing surfaces", 0);
-        let mesh = Elements::new(&bvh, fineness, settings.seed ^ 0xe1e, |triangle, front| {
+        let lit = |triangle: u32, front: bool| {
             let material = scene.material(triangle);
             let weak = material.emissive.max_element() > 0.0 && !emitters.sampled[triangle as usize];
             (front || material.double_sided) && !material.unlit && (may_scatter(material) || weak)
-        });
+        };
+        let mesh = Elements::new(&bvh, fineness, settings.seed ^ 0xe1e, lit, progress)?;
         let senders = mesh.senders();
         progress.check()?;
         let lamps = Lamps { optics: &optics, emitters: &emitters };
@@ -263,7 +264,7 @@ impl Illumination {
         let mut sky = sky::at_vertices(&optics, &mesh, settings.seed ^ 0x5c1, progress)?;
         let caustics = Caustics::new(&bvh, &photons);
         progress.check()?;
-        let probes = Probes::new(&bvh, &mesh, PROBES_APART * fineness.shortest);
+        let probes = Probes::new(&bvh, &mesh, PROBES_APART * fineness.shortest, progress)?;
         let surroundings = Surroundings { mesh: &mesh, senders: &senders, optics: &optics };
         let rays = GatheringRays { each: settings.indirect_rays as usize, together: MOST_GATHERING_RAYS };
         let shines = |s: u32| {

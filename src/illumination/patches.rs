@@ -2,6 +2,7 @@
 
 use super::IlluminationSettings;
 use super::elements::{Elements, Senders};
+use super::emitter::Emitter;
 use super::emitters::{Emitters, ShadowRays, VisibleEmitters};
 use super::images::Images;
 use super::lamp_image::Lamps;
@@ -13,7 +14,7 @@ use crate::error::Result;
 use crate::progress::Progress;
 use crate::random::Random;
 use crate::scene::bvh::{Hit, Ray, SceneBvh};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -124,7 +125,7 @@ impl Patches {
         seed: u64,
     ) -> Energy {
         let Found { leaving, irradiance, sky } = found;
-        let (mesh, bvh) = (around.mesh, &around.optics.bvh);
+        let mesh = around.mesh;
         let mut sums = [[0.0f64; 3]; 3];
         let mut add = |which: usize, flux: Vec3| {
             for (sum, part) in sums[which].iter_mut().zip(flux.to_array()) {
@@ -145,32 +146,59 @@ impl Patches {
             add(2, leaving[s] * flux * escaped);
             add(1, leaving[s] * flux * black);
         }
-        for (index, emitter) in emitters.polygons.iter().enumerate() {
-            let side = 64u32;
-            let mut random = Random::new(seed ^ 0xe4e, index as u64);
-            let (mut escaped, mut black) = (Vec3::ZERO, Vec3::ZERO);
-            for cell in 0..side * side {
-                let point = emitter.point(random.uniform(), random.uniform());
-                let up = !emitter.two_sided || cell % 2 == 0;
-                let normal = if up { emitter.normal } else { -emitter.normal };
-                let direction = sampling::hemisphere(normal, 1, &mut random).next().unwrap_or(normal);
-                random = Random::new(random.bits(), u64::from(cell));
-                let ray = Ray { origin: point.position + normal * bvh.offset(), direction };
-                match around.follow(ray, &mut random) {
-                    (RayEnd::Escaped { .. }, tint) => {
-                        escaped += tint;
-                        black += Vec3::ONE - tint;
-                    }
-                    (RayEnd::Black, _) => black += Vec3::ONE,
-                    // What optics took on the way to a surface.
-                    (RayEnd::Sender(_), tint) => black += Vec3::ONE - tint,
-                }
-            }
-            let flux = emitter.flux() / (side * side) as f32;
-            add(2, flux * escaped);
-            add(1, flux * black);
-        }
+        let (escaped, black) = lost_from_emitters(around, emitters, seed);
+        add(2, escaped);
+        add(1, black);
         let colour = |s: [f64; 3]| Vec3::new(s[0] as f32, s[1] as f32, s[2] as f32);
         Energy { emitted: colour(sums[0]), absorbed: colour(sums[1]), escaped: colour(sums[2]) }
     }
+}
+
+/// Rays that find out what becomes of the light of emitters. Their places and directions fill space evenly: the parts found are
+/// off by some 1e-4.
+const RAYS_OF_EMITTERS: u32 = 1 << 16;
+
+/// Flux of emitters that leaves the scene without a diffuse surface on its way, and what ends on black or in optics before it
+/// comes to one [W].
+fn lost_from_emitters(around: &Surroundings, emitters: &Emitters, seed: u64) -> (Vec3, Vec3) {
+    let power = |emitter: &Emitter| f64::from(emitter.flux().element_sum());
+    let total: f64 = emitters.polygons.iter().map(power).sum();
+    if total <= 0.0 {
+        return (Vec3::ZERO, Vec3::ZERO);
+    }
+    let mut below = 0.0;
+    let reached: Vec<f64> = emitters
+        .polygons
+        .iter()
+        .map(|emitter| {
+            below += power(emitter) / total;
+            below
+        })
+        .collect();
+    let mut random = Random::new(seed ^ 0xe4e, 0);
+    let shift: [f64; 4] = std::array::from_fn(|_| random.uniform());
+    let scene = around.optics.scene();
+    let one = |shot: u32| {
+        let u = (f64::from(shot) + 0.5) / f64::from(RAYS_OF_EMITTERS);
+        let emitter = &emitters.polygons[reached.partition_point(|&r| r <= u).min(reached.len() - 1)];
+        let [s, t, a, b] = sampling::spread(shift, u64::from(shot));
+        let point = emitter.point(s, t);
+        let normal = if emitter.two_sided && shot % 2 == 1 { -emitter.normal } else { emitter.normal };
+        let direction = sampling::lifted(normal, a, b);
+        let ray = Ray { origin: point.position + normal * around.optics.bvh.offset(), direction };
+        let mut random = Random::new(seed ^ 0xe4f, u64::from(shot));
+        let (end, tint) = around.follow(ray, &mut random);
+        // Polygons are drawn by their mean radiance.
+        let share = total / (power(emitter) * f64::from(RAYS_OF_EMITTERS));
+        let local = emitter.radiance(scene, point) * (emitter.area_of_sides() * PI * share) as f32;
+        match end {
+            RayEnd::Escaped { .. } => (local * tint, local * (Vec3::ONE - tint)),
+            RayEnd::Black => (Vec3::ZERO, local),
+            // What optics took on the way to a surface.
+            RayEnd::Sender(_) => (Vec3::ZERO, local * (Vec3::ONE - tint)),
+        }
+    };
+    let found: Vec<(Vec3, Vec3)> = (0..RAYS_OF_EMITTERS).into_par_iter().map(one).collect();
+    let sum = |part: fn(&(Vec3, Vec3)) -> Vec3| found.iter().map(|f| part(f).as_dvec3()).sum::<DVec3>().as_vec3();
+    (sum(|f| f.0), sum(|f| f.1))
 }

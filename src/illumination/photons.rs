@@ -13,7 +13,7 @@ use super::emitter::Emitter;
 use super::emitters::punctual_light;
 use super::lamp_image::Lamps;
 use super::paths::{Continuation, Optics, Way};
-use super::sampling::triangle_weights;
+use super::sampling::{spread, triangle_weights};
 use super::surface::ShadingPoint;
 use crate::error::Result;
 use crate::progress::Progress;
@@ -111,7 +111,7 @@ pub(crate) fn shoot(lit: Lamps, count: u32, seed: u64, progress: &Progress) -> R
                 let u = (shot as f64 + 0.5) / shots as f64;
                 let k = reached.partition_point(|&r| r <= u).min(targets.len() - 1);
                 let chance = chances[k] / strength;
-                let place: [f64; 4] = std::array::from_fn(|d| (shift[d] + shot as f64 * STRIDES[d]).fract());
+                let place = spread(shift, shot);
                 let mut random = Random::new(seed ^ 0x9407 ^ ((number as u64) << 32), shot);
                 let aimed = lamp.aim(lit, &targets[k], place)?;
                 follow(lit.optics, aimed, 1.0 / (chance * shots as f64), &mut random)
@@ -122,10 +122,6 @@ pub(crate) fn shoot(lit: Lamps, count: u32, seed: u64, progress: &Progress) -> R
     }
     Ok(photons)
 }
-
-/// Strides of the additive recurrence in four dimensions: powers of the inverse of the root of x⁵ = x + 1.
-const STRIDES: [f64; 4] =
-    [0.856_674_883_854_502_9, 0.733_891_856_627_126, 0.628_706_721_037_808_6, 0.538_597_257_223_61];
 
 /// A ray that arrives at a target, and the flux density that it stands for, times the target's area [W].
 struct Aimed {

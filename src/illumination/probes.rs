@@ -10,6 +10,8 @@
 //! over probes within R that face alike and can see it. Where all vertices are further apart each is its own probe.
 
 use super::elements::{Elements, Sites, Vertex};
+use crate::error::Result;
+use crate::progress::Progress;
 use crate::scene::bvh::SceneBvh;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -78,12 +80,16 @@ impl Cells {
 
 impl Probes {
     /// Probes for a mesh, none closer than `apart` [m] to another that faces alike.
-    pub(crate) fn new(bvh: &SceneBvh, mesh: &Elements, apart: f64) -> Self {
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Interrupted`] when asked to stop.
+    pub(crate) fn new(bvh: &SceneBvh, mesh: &Elements, apart: f64, progress: &Progress) -> Result<Self> {
         let (vertices, offset, sites) = (&mesh.vertices, bvh.offset(), Sites::new(&mesh.vertices));
         let origin = vertices.first().map_or(DVec3::ZERO, |vertex| vertex.position);
         let (mut at, mut cells) = (Vec::new(), Cells::new(apart, origin));
         let shown = sites.first.iter().map(|&v| (v, &vertices[v as usize])).filter(|(_, vertex)| !vertex.buried);
         for (index, vertex) in shown.clone() {
+            progress.check()?;
             let mut near: Vec<(f32, f32, u32)> = cells.near(vertex, ALIKE).collect();
             near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
             let seen = |probe: u32| sees(bvh, vertex, &vertices[at[probe as usize] as usize], offset);
@@ -99,14 +105,14 @@ impl Probes {
                 false => next.next().map(|probe| (probe, 1.0)).into_iter().collect(),
             };
             let shares = sites.first.iter().map(&mut own).collect();
-            return Self { shares, sites, at };
+            return Ok(Self { shares, sites, at });
         }
         let reach = REACH * apart;
         let mut wide = Cells::new(reach, origin);
         at.iter().enumerate().for_each(|(probe, &v)| wide.add(&vertices[v as usize], probe as u32));
         let shares = sites.first.par_iter().map(|&v| {
             let vertex = &vertices[v as usize];
-            if vertex.buried {
+            if vertex.buried || progress.stopped() {
                 return Vec::new();
             }
             let weight = |(distance, likeness, probe): (f32, f32, u32)| {
@@ -120,7 +126,9 @@ impl Probes {
             let sum: f32 = near.iter().map(|(_, w)| w).sum();
             near.into_iter().map(|(probe, w)| (probe, w / sum)).collect()
         });
-        Self { shares: shares.collect(), sites, at }
+        let shares = shares.collect();
+        progress.check()?;
+        Ok(Self { shares, sites, at })
     }
 
     /// What probes have found, at all vertices; zero inside bodies.
@@ -164,14 +172,14 @@ mod tests {
         room.scene.triangles.iter_mut().for_each(|triangle| triangle.instance = 0);
         let bvh = SceneBvh::new(room.scene);
         let fineness = Fineness { longest: 1.0, shortest: 0.1, nearness: 0.8, most_vertices: 60_000 };
-        let mesh = Elements::new(&bvh, fineness, 1, |_, _| true);
+        let mesh = Elements::new(&bvh, fineness, 1, |_, _| true, &Progress::new()).expect("a mesh");
         (bvh, mesh)
     }
 
     #[test]
     fn fine_meshes_share_probes_and_keep_what_is_smooth() {
         let (bvh, mesh) = sheet(60);
-        let probes = Probes::new(&bvh, &mesh, 0.05);
+        let probes = Probes::new(&bvh, &mesh, 0.05, &Progress::new()).expect("probes");
         // Some 400 places of 0.05 m on each side, for 21,600 corners.
         assert!(mesh.vertices.len() > 10_000 && (400..2000).contains(&probes.at.len()), "{}", probes.at.len());
         let value = |p: DVec3, n: DVec3| Vec3::new(1.0, (2.0 + p.x - 0.5 * p.z) as f32, (n.y as f32).signum());
@@ -191,7 +199,7 @@ mod tests {
     #[test]
     fn vertices_that_stand_apart_are_their_own_probes() {
         let (bvh, mesh) = sheet(6);
-        let probes = Probes::new(&bvh, &mesh, 0.02);
+        let probes = Probes::new(&bvh, &mesh, 0.02, &Progress::new()).expect("probes");
         let found: Vec<Vec3> = probes.at.iter().map(|&v| mesh.vertices[v as usize].position.as_vec3()).collect();
         for (vertex, spread) in mesh.vertices.iter().zip(probes.spread(&found)) {
             assert!((spread - vertex.position.as_vec3()).length() < 1e-6, "{spread} at {vertex:?}");

@@ -36,6 +36,21 @@ pub(crate) fn hemisphere(normal: DVec3, side: usize, random: &mut Random) -> imp
     })
 }
 
+/// The cosine-distributed direction round `normal` of a place in the unit square.
+pub(crate) fn lifted(normal: DVec3, u: f64, v: f64) -> DVec3 {
+    let ((x, y), (a, b)) = (tangents(normal), disk(u, v));
+    x * a + y * b + normal * (1.0 - a * a - b * b).max(0.0).sqrt()
+}
+
+/// Strides of the additive recurrence in four dimensions (Roberts 2018): powers of the inverse of the root of x⁵ = x + 1.
+const STRIDES: [f64; 4] =
+    [0.856_674_883_854_502_9, 0.733_891_856_627_126, 0.628_706_721_037_808_6, 0.538_597_257_223_61];
+
+/// Place `index` of a sequence that fills the unit cube of four dimensions evenly, moved by `shift`.
+pub(crate) fn spread(shift: [f64; 4], index: u64) -> [f64; 4] {
+    std::array::from_fn(|d| (shift[d] + index as f64 * STRIDES[d]).fract())
+}
+
 /// Shirley & Chiu's concentric map of the unit square on the unit disk; keeps areas up to the factor π.
 pub(crate) fn disk(u: f64, v: f64) -> (f64, f64) {
     let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
