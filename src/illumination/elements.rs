@@ -18,6 +18,8 @@ pub(crate) const NONE: u32 = u32::MAX;
 pub(super) const DRAWN_IN: f64 = 0.02;
 /// Height above an element, over its longest edge, at which its points look at each other.
 pub(super) const LIFT: f64 = 0.005;
+/// Into how many parts a side of an element is cut where light is uneven.
+const MANY: u32 = 6;
 /// A split: its two children stand side by side.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Node {
@@ -200,6 +202,19 @@ impl Elements {
             Some(k) => vec![towards(element.barycentric[k as usize], DRAWN_IN)],
             None => element.barycentric.iter().map(|&b| towards(b, 0.5)).chain([middle]).collect(),
         }
+    }
+
+    /// Middles of [`MANY`]² equal parts of an element, as [`Elements::places`].
+    pub(crate) fn many_places(&self, element: u32) -> Vec<[f64; 2]> {
+        let [a, b, c] = self.elements[element as usize].barycentric;
+        let at = |u: f64, v: f64| std::array::from_fn(|k| a[k] + (b[k] - a[k]) * u + (c[k] - a[k]) * v);
+        let part = 1.0 / f64::from(3 * MANY);
+        // Parts that stand upright, and those between them that stand on their heads.
+        let middles = |third: u32, rows: u32| {
+            let place = move |i: u32, j: u32| (f64::from(3 * i + third) * part, f64::from(3 * j + third) * part);
+            (0..rows).flat_map(move |j| (0..rows - j).map(move |i| place(i, j)))
+        };
+        middles(1, MANY).chain(middles(2, MANY - 1)).map(|(u, v)| at(u, v)).collect()
     }
 
     /// At most `most` vertices spread over the mesh.

@@ -58,6 +58,7 @@ pub(crate) mod test_oracle;
 pub(crate) mod test_rooms;
 #[cfg(test)]
 mod tests;
+mod transport;
 
 pub use form_factor::FormFactor;
 pub(crate) use irradiance_cache::IrradianceCache;
@@ -79,10 +80,11 @@ use meshing::Fineness;
 use patches::{Found, Patches};
 use paths::Optics;
 use probes::Probes;
-use radiosity::{GatheringRays, Surroundings, Transport};
+use radiosity::Surroundings;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
+use transport::{GatheringRays, Transport};
 
 /// How light is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +93,8 @@ pub struct IlluminationSettings {
     pub form_factor: FormFactor,
     /// The solver stops when no colour's residual is larger than this part of the right-hand side.
     pub residual: f64,
-    /// Rays per vertex that gather indirect light; fewer are cast when the scene has very many vertices.
+    /// Rays per vertex that gather indirect light; fewer are cast when the scene has very many vertices, more where brightness
+    /// jumps.
     pub indirect_rays: u32,
     /// Shadow rays per point for all emitters together.
     pub shadow_rays: u32,
@@ -135,7 +138,7 @@ impl Default for IlluminationSettings {
         Self {
             form_factor: FormFactor::Lambert,
             residual: 1e-4,
-            indirect_rays: 441,
+            indirect_rays: 256,
             shadow_rays: 16,
             penumbra_rays: 64,
             longest_element: 1.0 / 16.0,
@@ -197,6 +200,8 @@ pub struct IlluminationReport {
 
 /// Most gathering rays in all: probes beyond some tens of thousands lie so close that the noise of each counts less.
 const MOST_GATHERING_RAYS: usize = 4_000_000;
+/// Residual at which it is known well enough which patches are bright.
+const ROUGH_RESIDUAL: f64 = 1e-2;
 /// Distance within which vertices share gathering rays, over the shortest edge that is split.
 const PROBES_APART: f64 = 0.5;
 /// Vertices at which images of lamps are compared.
@@ -271,9 +276,9 @@ impl Illumination {
             let own = patches.direct[s as usize] + patches.emission[s as usize];
             (own + mesh.mean_over(senders.all[s as usize], &sky)).max_element() > 0.0
         };
-        let transport = Transport::cast(&surroundings, &probes, rays, shines, settings.seed ^ 0x6a7, progress)?;
+        let mut transport = Transport::cast(surroundings, &probes, rays, shines, settings.seed ^ 0x6a7, progress)?;
         let scale = settings.form_factor.scale() as f32;
-        sky.iter_mut().zip(transport.beyond()).for_each(|(sky, beyond)| *sky = (*sky + *beyond) * scale);
+        sky.iter_mut().zip(transport.beyond()).for_each(|(sky, beyond)| *sky = (*sky + beyond) * scale);
         for (direct, &sender) in patches.direct.iter_mut().zip(&senders.all) {
             *direct += mesh.mean_over(sender, &sky);
         }
@@ -283,10 +288,16 @@ impl Illumination {
             let each = senders.all.par_iter().zip(&patches.albedo);
             each.map(|(&sender, &albedo)| albedo * mesh.mean_over(sender, x)).collect()
         };
-        let (irradiance, convergence) =
-            radiosity::solve(&source, bounce, |b| transport.gather(b, scale), settings.residual, 200, progress)?;
-        let reflected = bounce(&irradiance);
-        let leaving: Vec<Vec3> = source.iter().zip(&reflected).map(|(s, r)| *s + *r).collect();
+        let solve = |transport: &Transport, residual: f64| {
+            radiosity::solve(&source, bounce, |b| transport.gather(b, scale), residual, 200, progress)
+        };
+        let (first, _) = solve(&transport, settings.residual.max(ROUGH_RESIDUAL))?;
+        let leave = |irradiance: &[Vec3]| -> Vec<Vec3> {
+            bounce(irradiance).iter().zip(&source).map(|(reflected, s)| *s + *reflected).collect()
+        };
+        transport.refine(&leave(&first), MOST_GATHERING_RAYS, progress)?;
+        let (irradiance, convergence) = solve(&transport, settings.residual)?;
+        let leaving = leave(&irradiance);
         let found = Found { leaving: &leaving, irradiance: &irradiance, sky: &sky };
         let gathering_rays = transport.rays();
         let energy = patches.energy(&surroundings, &emitters, &transport, found, settings.seed);

@@ -7,9 +7,10 @@ use super::emitters::{Emitters, ShadowRays, VisibleEmitters};
 use super::images::Images;
 use super::lamp_image::Lamps;
 use super::photons::Photon;
-use super::radiosity::{RayEnd, Surroundings, Transport};
+use super::radiosity::{RayEnd, Surroundings};
 use super::surface::Surface;
-use super::{Energy, sampling};
+use super::transport::Transport;
+use super::{Energy, sampling, sky};
 use crate::error::Result;
 use crate::progress::Progress;
 use crate::random::Random;
@@ -17,6 +18,10 @@ use crate::scene::bvh::{Hit, Ray, SceneBvh};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
+
+/// Where a patch's places get less than this part of the light of its brightest one, an edge of a shadow is about: more are looked
+/// at.
+const EVEN: f32 = 0.7;
 
 /// Per sender: what it does to light and what it gets.
 pub(crate) struct Patches {
@@ -65,31 +70,46 @@ impl Patches {
                 if buried || progress.stopped() {
                     return sums;
                 }
-                // A share of the rays of a picture's point at each place: the mean over the patch is what counts.
-                let places = mesh.places(sender);
-                let share = places.len() as u32;
-                let rays = ShadowRays {
-                    first: settings.shadow_rays.div_ceil(share),
-                    penumbra: 0,
-                    clear: clear[sender.element as usize],
-                };
                 let area = mesh.area(sender.element) / if sender.corner.is_some() { 3.0 } else { 1.0 };
                 let mut random = Random::new(settings.seed ^ 0x1ea, number as u64);
-                for &barycentric in &places {
-                    let position = bvh.scene().triangles[element.triangle as usize].at(barycentric);
-                    let hit =
-                        Hit { triangle: element.triangle, distance: 0.0, position, barycentric, front: element.front };
-                    let surface = Surface::at(bvh.scene(), &hit, (area / places.len() as f64).sqrt());
-                    let at = surface.shading_point(bvh.offset());
-                    let (areas, points) = emitters.light(optics, at, rays, &mut random);
-                    sums[0] += surface.albedo;
-                    sums[1] += areas + points + images.strong(lamps, at, rays, &mut random);
-                    sums[2] += points;
-                    if !emitters.sampled[element.triangle as usize] {
-                        sums[3] += surface.emission;
+                let mut look = |places: &[[f64; 2]]| {
+                    // A share of the rays of a picture's point at each place: the mean over the patch is what counts.
+                    let share = places.len() as u32;
+                    let rays = ShadowRays {
+                        first: settings.shadow_rays.div_ceil(share),
+                        penumbra: 0,
+                        clear: clear[sender.element as usize],
+                    };
+                    let width = (area / places.len() as f64).sqrt();
+                    let (mut low, mut high) = (f32::INFINITY, 0.0f32);
+                    let mut sums = [Vec3::ZERO; 5];
+                    for &barycentric in places {
+                        let position = bvh.scene().triangles[element.triangle as usize].at(barycentric);
+                        let front = element.front;
+                        let hit = Hit { triangle: element.triangle, distance: 0.0, position, barycentric, front };
+                        let surface = Surface::at(bvh.scene(), &hit, width);
+                        let at = surface.shading_point(bvh.offset());
+                        let (areas, points) = emitters.light(optics, at, rays, &mut random);
+                        // Counted where it arrives, as that of punctual lights is.
+                        let sky = bvh.scene().environment.as_ref().map_or(Vec3::ZERO, |around| {
+                            sky::bright(around, optics, at, rays, &mut random) * emitters.scale()
+                        });
+                        let direct = areas + points + sky + images.strong(lamps, at, rays, &mut random);
+                        (low, high) = (low.min(direct.element_sum()), high.max(direct.element_sum()));
+                        sums[0] += surface.albedo;
+                        sums[1] += direct;
+                        sums[2] += points + sky;
+                        if !emitters.sampled[element.triangle as usize] {
+                            sums[3] += surface.emission;
+                        }
                     }
-                }
-                sums = sums.map(|sum| sum / share as f32);
+                    (sums.map(|sum| sum / share as f32), low < EVEN * high)
+                };
+                let (found, uneven) = look(&mesh.places(sender));
+                sums = match uneven && sender.corner.is_none() {
+                    true => look(&mesh.many_places(sender.element)).0,
+                    false => found,
+                };
                 sums[4] = Vec3::splat(area as f32);
                 sums
             })
@@ -126,6 +146,7 @@ impl Patches {
     ) -> Energy {
         let Found { leaving, irradiance, sky } = found;
         let mesh = around.mesh;
+        let losses = transport.losses();
         let mut sums = [[0.0f64; 3]; 3];
         let mut add = |which: usize, flux: Vec3| {
             for (sum, part) in sums[which].iter_mut().zip(flux.to_array()) {
@@ -141,7 +162,7 @@ impl Patches {
             let corners = mesh.elements[sender.element as usize].corners;
             let chosen = sender.corner.map_or(&corners[..], |k| &corners[k as usize..=k as usize]);
             let n = chosen.len() as f32;
-            let losses = chosen.iter().map(|&v| transport.losses(v as usize));
+            let losses = chosen.iter().map(|&v| losses[v as usize]);
             let (escaped, black) = losses.fold((Vec3::ZERO, Vec3::ZERO), |sum, l| (sum.0 + l.0 / n, sum.1 + l.1 / n));
             add(2, leaving[s] * flux * escaped);
             add(1, leaving[s] * flux * black);

@@ -18,22 +18,39 @@ pub(crate) fn tangents(normal: DVec3) -> (DVec3, DVec3) {
     )
 }
 
-/// Cosine-distributed directions round `normal`, one in each cell of a `side` × `side` grid on the unit square.
+/// Cosine-distributed directions round a normal, one in each cell of a `side` × `side` grid on the unit square.
 ///
 /// The square is laid on the disk by Shirley & Chiu's concentric map (1997), whose cells stay compact, and the disk is
 /// lifted to the hemisphere (Malley). The whole set is turned by a random angle, so that neighbouring sets differ.
-pub(crate) fn hemisphere(normal: DVec3, side: usize, random: &mut Random) -> impl Iterator<Item = DVec3> {
-    let (x, y) = tangents(normal);
-    let (sin, cos) = (TAU * random.uniform()).sin_cos();
-    let (x, y) = (x * cos + y * sin, y * cos - x * sin);
-    let mut random = random.clone();
-    (0..side * side).map(move |cell| {
-        let u = ((cell % side) as f64 + random.uniform()) / side as f64;
-        let v = ((cell / side) as f64 + random.uniform()) / side as f64;
+pub(crate) struct Hemisphere {
+    x: DVec3,
+    y: DVec3,
+    normal: DVec3,
+    side: usize,
+}
+
+impl Hemisphere {
+    /// One round `normal`; takes a number of `random`.
+    pub(crate) fn new(normal: DVec3, side: usize, random: &mut Random) -> Self {
+        let (x, y) = tangents(normal);
+        let (sin, cos) = (TAU * random.uniform()).sin_cos();
+        Self { x: x * cos + y * sin, y: y * cos - x * sin, normal, side }
+    }
+
+    /// The direction of a place in the unit square of a cell; cells are counted row by row.
+    pub(crate) fn direction(&self, cell: usize, [u, v]: [f64; 2]) -> DVec3 {
+        let u = ((cell % self.side) as f64 + u) / self.side as f64;
+        let v = ((cell / self.side) as f64 + v) / self.side as f64;
         let (a, b) = disk(u, v);
-        let up = (1.0 - a * a - b * b).max(0.0).sqrt();
-        x * a + y * b + normal * up
-    })
+        self.x * a + self.y * b + self.normal * (1.0 - a * a - b * b).max(0.0).sqrt()
+    }
+}
+
+/// The directions of a [`Hemisphere`], one after another.
+pub(crate) fn hemisphere(normal: DVec3, side: usize, random: &mut Random) -> impl Iterator<Item = DVec3> {
+    let hemisphere = Hemisphere::new(normal, side, random);
+    let mut random = random.clone();
+    (0..side * side).map(move |cell| hemisphere.direction(cell, [random.uniform(), random.uniform()]))
 }
 
 /// The cosine-distributed direction round `normal` of a place in the unit square.

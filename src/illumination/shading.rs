@@ -64,9 +64,13 @@ impl Illumination {
             _ => ShadowRays { first: (first + penumbra).div_ceil(share), penumbra: 0, clear },
         };
         let (areas, points) = self.emitters.light(&self.optics, at, rays, random);
+        let sky =
+            self.bvh().scene().environment.as_ref().map_or(Vec3::ZERO, |around| {
+                sky::bright(around, &self.optics, at, rays, random) * self.emitters.scale()
+            });
         let rays = ShadowRays { first: rays.first.div_ceil(2), penumbra: rays.penumbra / 2, ..rays };
         let mirrored = self.images.strong(self.lamps(), at, rays, random);
-        areas + points + mirrored + self.caustics.light(surface.position, surface.facing)
+        areas + points + mirrored + sky + self.caustics.light(surface.position, surface.facing)
     }
 
     /// Irradiance over π that comes by way of other surfaces.
@@ -88,7 +92,7 @@ impl Illumination {
             Some(around) => {
                 let side = f64::from(rays.div_ceil(share)).sqrt().ceil() as usize;
                 let at = surface.shading_point(self.bvh().offset());
-                sky::straight(around, &self.optics, at, side, random) * self.settings.form_factor.scale() as f32
+                sky::plain(around, &self.optics, at, side, random) * self.settings.form_factor.scale() as f32
             }
             None => Vec3::ZERO,
         };

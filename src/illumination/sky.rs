@@ -1,10 +1,11 @@
 //! Light of a scene's environment on its surfaces.
 //!
-//! What comes straight from the smooth part of the environment is sampled at the vertices of the mesh by its brightness, with
-//! a shadow ray for each sample; its suns are lamps like others. What comes by way of mirrors and glass is found by the rays
-//! that gather light from other surfaces.
+//! What comes straight from the plain part of the environment is sampled at the vertices of the mesh by its brightness, with
+//! a shadow ray for each sample; what is brighter is sampled at each point that is asked for, and its suns are lamps like others.
+//! What comes by way of mirrors and glass is found by the rays that gather light from other surfaces.
 
 use super::elements::Elements;
+use super::emitters::ShadowRays;
 use super::paths::Optics;
 use super::sampling::hemisphere;
 use super::surface::ShadingPoint;
@@ -21,38 +22,76 @@ const MOST: usize = 512;
 const LEAST: usize = 72;
 const TOGETHER: usize = 8_000_000;
 
-/// Irradiance over π that comes straight from the environment's smooth part, by `2 side²` rays: half of them are drawn by its
+/// Irradiance over π that comes straight from the environment's plain part, by `2 side²` rays: half of them are drawn by its
 /// brightness, half by the cosine law, each weighted by how densely both draw its direction (Veach's balance heuristic).
-pub(super) fn straight(
-    around: &Environment,
-    optics: &Optics,
-    at: ShadingPoint,
-    side: usize,
-    random: &mut Random,
-) -> Vec3 {
-    let reach = 2.0 * optics.bvh.size();
+pub(super) fn plain(around: &Environment, optics: &Optics, at: ShadingPoint, side: usize, random: &mut Random) -> Vec3 {
+    let dome = around.plain();
     let brought = |direction: DVec3, by_brightness: f64| {
-        let cosine = direction.dot(at.normal);
-        if cosine <= 0.0 {
+        let by_cosine = direction.dot(at.normal) * FRAC_1_PI;
+        if by_cosine <= 0.0 {
             return Vec3::ZERO;
         }
-        let by_cosine = cosine * FRAC_1_PI;
-        let left = optics.transmittance(at.position, at.position + direction * reach);
-        around.smooth(direction) * left * (by_cosine / (by_brightness + by_cosine)) as f32
+        dome.radiance(direction) * left(optics, at, direction) * (by_cosine / (by_brightness + by_cosine)) as f32
     };
     let mut sum = Vec3::ZERO;
     for cell in 0..side * side {
-        // Strata along the order of the texels, which runs row by row.
-        let which = (cell as f64 + random.uniform()) / (side * side) as f64;
-        let (direction, density) = around.drawn([which, random.uniform(), random.uniform()]);
-        sum += brought(direction, density);
+        let drawn = dome.drawn(stratum(cell, side, random));
+        sum += brought(drawn.direction, drawn.density);
     }
     for direction in hemisphere(at.normal, side, random) {
-        sum += brought(direction, around.density(direction));
+        sum += brought(direction, dome.density(direction));
     }
     // `hemisphere` works on a copy of the stream; step past what it has used.
     *random = Random::new(random.bits(), 1);
     sum / (side * side) as f32
+}
+
+/// Rays that do not agree to this part of their mean are not enough.
+const UNSURE: f64 = 0.03;
+
+/// Irradiance over π that comes straight from the environment's bright part.
+pub(super) fn bright(
+    around: &Environment,
+    optics: &Optics,
+    at: ShadingPoint,
+    rays: ShadowRays,
+    random: &mut Random,
+) -> Vec3 {
+    let Some(dome) = around.bright() else { return Vec3::ZERO };
+    let mut cast = |side: usize| {
+        let (mut sum, mut squares) = (DVec3::ZERO, 0.0);
+        for cell in 0..side * side {
+            let drawn = dome.drawn(stratum(cell, side, random));
+            let cosine = drawn.direction.dot(at.normal);
+            if cosine > 0.0 {
+                let light = drawn.texel * left(optics, at, drawn.direction);
+                let light = light.as_dvec3() * (cosine * FRAC_1_PI / drawn.density);
+                sum += light;
+                squares += light.element_sum().powi(2);
+            }
+        }
+        (sum, squares)
+    };
+    let side = |rays: u32| f64::from(rays).sqrt().ceil() as usize;
+    let count = (side(rays.first) * side(rays.first)) as f64;
+    let (sum, squares) = cast(side(rays.first));
+    let mean = sum.element_sum() / count;
+    let error = ((squares / count - mean * mean).max(0.0) / count).sqrt();
+    if rays.penumbra == 0 || error <= UNSURE * mean {
+        return (sum / count).as_vec3();
+    }
+    let more = side(rays.penumbra);
+    ((sum + cast(more).0) / (count + (more * more) as f64)).as_vec3()
+}
+
+/// A place in a cell of a lattice of `side` × `side` on the unit square.
+fn stratum(cell: usize, side: usize, random: &mut Random) -> [f64; 2] {
+    [cell % side, cell / side].map(|k| (k as f64 + random.uniform()) / side as f64)
+}
+
+/// What is left of light that comes from so far away.
+fn left(optics: &Optics, at: ShadingPoint, direction: DVec3) -> Vec3 {
+    optics.transmittance(at.position, at.position + direction * (2.0 * optics.bvh.size()))
 }
 
 /// The same at all vertices of the mesh.
@@ -67,7 +106,7 @@ pub(super) fn at_vertices(optics: &Optics, mesh: &Elements, seed: u64, progress:
         if vertex.buried || progress.stopped() {
             return Vec3::ZERO;
         }
-        straight(around, optics, vertex.shading_point(offset), side, &mut Random::new(seed, index as u64))
+        plain(around, optics, vertex.shading_point(offset), side, &mut Random::new(seed, index as u64))
     });
     let found = found.collect();
     progress.check()?;

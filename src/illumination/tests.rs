@@ -308,3 +308,34 @@ fn a_closed_body_of_many_triangles_is_lit_on_the_side_where_there_is_light() {
     let direct = rho / PI * intensity / 1.5f64.powi(2);
     assert!((f64::from(seen_from(&outside, DVec3::Y, DVec3::NEG_Y)) / direct - 1.0).abs() < 0.01);
 }
+
+#[test]
+fn a_spot_of_sun_lights_what_is_above_it() {
+    // Straight light on a white square of 0.6 m in the dark, and over it, beside the beam, a ceiling that gets light from there
+    // alone: E/π = B·F with the square's form factor, some of a probe's 256 cells.
+    let mut room = Room::default();
+    let (white, grey) = (Material::diffuse(Vec3::ONE), Material::diffuse(Vec3::splat(0.02)));
+    let (white, grey) = (room.material(white), room.material(grey));
+    let square = [[-0.3, 0.3], [0.3, 0.3], [0.3, -0.3], [-0.3, -0.3]].map(|[x, z]| DVec3::new(x, 0.0, z));
+    room.quad(square[0], square[1] - square[0], square[3] - square[0], white);
+    room.quad(DVec3::new(0.35, 1.0, -0.6), DVec3::X, DVec3::Z * 1.2, grey);
+    room.scene.lights.push(PunctualLight {
+        kind: LightKind::Directional,
+        position: Vec3::ZERO,
+        direction: Vec3::NEG_Y,
+        intensity: Vec3::splat(PI as f32),
+        range: f32::INFINITY,
+    });
+    let light = lit(&room.scene, IlluminationSettings::default());
+    let (mut mean, mut square_error, n) = (0.0, 0.0, 200);
+    let mut random = Random::new(11, 3);
+    for _ in 0..n {
+        let at = DVec3::new(0.37 + 0.96 * random.uniform(), 1.0, -0.58 + 1.16 * random.uniform());
+        let exact = form_factor::point_to_polygon(at, DVec3::NEG_Y, &square);
+        let seen = seen(&light, at - DVec3::Y * 0.1, DVec3::Y);
+        let off = f64::from(seen.x) / (0.02 * exact) - 1.0;
+        (mean, square_error) = (mean + off / f64::from(n), square_error + off * off / f64::from(n));
+    }
+    // Without more rays where brightness jumps single points are off by 15 %, with them by 1.6 %.
+    assert!(mean.abs() < 0.01 && square_error.sqrt() < 0.04, "{mean} {}", square_error.sqrt());
+}

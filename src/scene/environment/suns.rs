@@ -1,13 +1,14 @@
 //! What is small and bright in a panorama.
 
-use super::Map;
+use super::dome::Map;
 use glam::{DVec3, Vec3};
 
 /// Brighter than the mean of all that is not very bright by this factor: a lamp.
 const BRIGHT: f32 = 25.0;
 
-/// Widest extent of a sun [sr]: a disc of 5° across; wider lamps throw shadows that are soft enough to be sampled.
-const WIDEST: f64 = 6e-3;
+/// Widest extent of a sun [sr]: a disc of 1.6° across, three times as wide as the real one. The shadows of wider lamps are seen
+/// to be soft.
+const WIDEST: f64 = 6e-4;
 
 /// Most suns; further ones stay where they are.
 const MOST: usize = 8;
