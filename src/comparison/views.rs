@@ -53,7 +53,7 @@ pub fn view_cases() -> Vec<ViewCase> {
         case("22 × 14 mm", 22.0, 14.0, 24, 80),
         all("all of the light, one frame", 1, 450),
         all("all of the light, 3 frames", 3, 200),
-        all("all of the light, 8 frames", 8, 150),
+        all("all of the light, 8 frames", 8, 300),
     ]
 }
 

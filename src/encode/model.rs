@@ -101,8 +101,7 @@ impl PanelModel {
             (modulated + incident * self.dead, modulated)
         };
         let (total, modulated) = if self.crosstalk > 0.0 {
-            let phases: Vec<f32> = wishes.par_iter().map(|&wish| self.show(wish).0).collect();
-            let phases = blurred(&phases, self.grid.width, self.crosstalk);
+            let phases = self.blended_phases(wishes);
             phases.par_iter().enumerate().map(|(i, &p)| lit(i, phasor(p * (1.0 / TAU)) * self.fill)).unzip()
         } else {
             wishes.par_iter().enumerate().map(|(i, &wish)| lit(i, self.show(wish).1)).unzip()
@@ -110,14 +109,19 @@ impl PanelModel {
         Light { total, modulated }
     }
 
+    /// Phases that the panel shows where neighbours blend.
+    fn blended_phases(&self, wishes: &[f32]) -> Vec<f32> {
+        let mut phases = vec![0.0f32; wishes.len()];
+        phases.par_iter_mut().zip(wishes).for_each(|(phase, &wish)| *phase = self.show(wish).0);
+        blurred(&phases, self.grid.width, self.crosstalk)
+    }
+
     /// The light of all pixels where neighbours blend, which no pixel's own wish tells; `None` without crosstalk.
     pub(super) fn blended(&self, wishes: &[f32]) -> Option<Vec<Complex32>> {
         if !self.blends() {
             return None;
         }
-        let mut phases = vec![0.0f32; wishes.len()];
-        phases.par_iter_mut().zip(wishes).for_each(|(phase, &wish)| *phase = self.show(wish).0);
-        let phases = blurred(&phases, self.grid.width, self.crosstalk);
+        let phases = self.blended_phases(wishes);
         let mut light = zeroed(wishes.len());
         let width = self.grid.width;
         light.par_chunks_mut(width).zip(phases.par_chunks(width)).for_each(|(light, phases)| {

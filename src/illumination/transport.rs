@@ -17,7 +17,7 @@ use crate::error::Result;
 use crate::progress::Progress;
 use crate::random::Random;
 use crate::scene::bvh::Ray;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// How many rays gather.
@@ -60,6 +60,19 @@ const OPTICS: u32 = u32::MAX - 3;
 const AGAIN: u32 = u32::MAX - 4;
 const SENDERS: u32 = AGAIN;
 
+/// The end of a ray by way of mirrors and glass.
+#[derive(Clone, Copy)]
+struct ByOptics {
+    /// Its cell, or [`AGAIN`] for a part of one.
+    cell: u32,
+    /// The sender that it has met, or [`ESCAPED`].
+    met: u32,
+    /// What is left of light that comes this way, times the part of a cell that it stands for.
+    tint: Vec3,
+    /// What the environment sends this way, likewise.
+    beyond: Vec3,
+}
+
 /// What one probe has found.
 #[derive(Default)]
 struct Gathered {
@@ -67,8 +80,8 @@ struct Gathered {
     cells: Vec<u32>,
     /// Senders that the rays of cells cut into 2², 3² … parts have met, each for a part of a cell.
     fine: [Vec<u32>; FINEST - 1],
-    /// Those by way of mirrors and glass, with what is left of their light.
-    tinted: Vec<(u32, Vec3)>,
+    /// What rays by way of mirrors and glass have met.
+    optics: Vec<ByOptics>,
     /// Cells that count: those above its horizon.
     counted: f32,
     escaped: Vec3,
@@ -116,7 +129,7 @@ impl<'a> Transport<'a> {
                 *found = closer;
             } else {
                 // What it sees sends nothing.
-                (found.cells, found.tinted) = (Vec::new(), Vec::new());
+                (found.cells, found.optics) = (Vec::new(), Vec::new());
             }
         }
         Ok(Self { around, probes, side, seed, found })
@@ -200,45 +213,69 @@ impl Gathered {
         found.cells = (0..side * side)
             .map(|cell| {
                 let direction = hemisphere.direction(cell, [random.uniform(), random.uniform()]);
-                found.follow(around, vertex, direction, 1.0, &mut onward)
+                found.follow(around, vertex, direction, [cell as u32, 1], &mut onward)
             })
             .collect();
         found
     }
 
-    /// Follows a ray that stands for so much of a cell: adds what escapes, is absorbed, or comes by way of optics, and tells what
-    /// it has met plainly.
+    /// Follows a ray for a cell, or for one of so many parts of one: adds what escapes, is absorbed, or comes by way of optics, and
+    /// tells what it has met plainly.
     fn follow(
         &mut self,
         around: &Surroundings,
         vertex: &Vertex,
-        direction: glam::DVec3,
-        part: f32,
+        direction: DVec3,
+        [cell, parts]: [u32; 2],
         random: &mut Random,
     ) -> u32 {
         if direction.dot(vertex.facing()) <= 0.0 {
             return BELOW;
         }
+        let part = 1.0 / parts as f32;
         self.counted += part;
         let origin = vertex.origin(around.optics.bvh.offset());
         let (reached, tint) = around.follow(Ray { origin, direction }, random);
-        let left = if reached == RayEnd::Black { Vec3::ZERO } else { tint };
-        self.absorbed += (Vec3::ONE - left) * part;
-        match reached {
-            RayEnd::Black => ABSORBED,
-            RayEnd::Escaped { direction, bent } => {
-                self.escaped += tint * part;
-                if bent && let Some(environment) = &around.optics.scene().environment {
-                    self.beyond += tint * environment.smooth(direction) * part;
-                }
-                if tint == Vec3::ONE && !bent { ESCAPED } else { OPTICS }
+        let (met, mut beyond) = match reached {
+            RayEnd::Black => {
+                self.absorbed += part;
+                return ABSORBED;
             }
-            RayEnd::Sender(sender) if tint == Vec3::ONE => sender,
-            RayEnd::Sender(sender) => {
-                self.tinted.push((sender, tint * part));
-                OPTICS
+            RayEnd::Sender(sender) => (sender, Vec3::ZERO),
+            RayEnd::Escaped { bent: false, .. } => (ESCAPED, Vec3::ZERO),
+            RayEnd::Escaped { direction, bent: true } => {
+                let environment = around.optics.scene().environment.as_ref();
+                (ESCAPED, environment.map_or(Vec3::ZERO, |environment| environment.smooth(direction)))
             }
+        };
+        if met == ESCAPED {
+            self.escaped += tint * part;
         }
+        self.absorbed += (Vec3::ONE - tint) * part;
+        let bent = matches!(reached, RayEnd::Escaped { bent: true, .. });
+        if tint == Vec3::ONE && !bent {
+            return met;
+        }
+        beyond *= tint * part;
+        self.beyond += beyond;
+        self.optics.push(ByOptics { cell: if parts > 1 { AGAIN } else { cell }, met, tint: tint * part, beyond });
+        OPTICS
+    }
+
+    /// Takes back what the rays of these cells have found by way of optics.
+    fn forget(&mut self, chosen: &[(u32, usize)]) {
+        let Self { optics, escaped, absorbed, beyond, .. } = self;
+        optics.retain(|end| {
+            let again = chosen.binary_search_by_key(&end.cell, |(cell, _)| *cell).is_ok();
+            if again {
+                *absorbed -= Vec3::ONE - end.tint;
+                *beyond -= end.beyond;
+                if end.met == ESCAPED {
+                    *escaped -= end.tint;
+                }
+            }
+            !again
+        });
     }
 
     /// Senders that are met plainly, one for each cell.
@@ -253,29 +290,30 @@ impl Gathered {
             fine.iter().map(|&sender| radiance[sender as usize]).sum::<Vec3>() / (parts * parts) as f32
         };
         let fine: Vec3 = self.fine.iter().zip(2..).map(of_parts).sum();
-        let tinted: Vec3 = self.tinted.iter().map(|&(sender, weight)| radiance[sender as usize] * weight).sum();
+        let of_optics = |end: &ByOptics| radiance.get(end.met as usize).map_or(Vec3::ZERO, |light| *light * end.tint);
+        let tinted: Vec3 = self.optics.iter().map(of_optics).sum();
         (plain + fine + tinted) / self.counted.max(1.0)
     }
 
-    /// Cells whose neighbours differ in brightness, and into how many parts a side of each is to be cut; not those that look by way
-    /// of optics.
+    /// Cells whose neighbours differ in brightness, and into how many parts a side of each is to be cut.
     fn jumps(&self, side: usize, brightness: &[f32], jump: f32) -> Vec<(u32, usize)> {
         if self.cells.len() != side * side {
             return Vec::new();
         }
-        let of = |cell: u32| if cell < SENDERS { brightness[cell as usize] } else { 0.0 };
-        let unit = jump * self.cells.iter().map(|&cell| of(cell)).sum::<f32>() / self.counted.max(1.0);
+        let of = |met: u32| brightness.get(met as usize).copied().unwrap_or(0.0);
+        let mut lights: Vec<f32> = self.cells.iter().map(|&met| of(met)).collect();
+        for end in self.optics.iter().filter(|end| end.cell < SENDERS) {
+            lights[end.cell as usize] = of(end.met) * end.tint.element_sum() / 3.0;
+        }
+        let unit = jump * lights.iter().sum::<f32>() / self.counted.max(1.0);
         let parts = |cell: u32| {
             let (x, y) = (cell as usize % side, cell as usize / side);
-            if self.cells[cell as usize] == OPTICS {
-                return None;
-            }
             let (mut low, mut high) = (f32::INFINITY, 0.0f32);
             for row in y.saturating_sub(1)..=(y + 1).min(side - 1) {
                 for column in x.saturating_sub(1)..=(x + 1).min(side - 1) {
-                    let beside = self.cells[row * side + column];
-                    if (column, row) != (x, y) && beside != BELOW {
-                        (low, high) = (low.min(of(beside)), high.max(of(beside)));
+                    let beside = row * side + column;
+                    if (column, row) != (x, y) && self.cells[beside] != BELOW {
+                        (low, high) = (low.min(lights[beside]), high.max(lights[beside]));
                     }
                 }
             }
@@ -292,22 +330,20 @@ impl Gathered {
         let hemisphere = Hemisphere::new(vertex.normal, side, &mut Random::new(seed, u64::from(at)));
         let mut random = Random::new(seed ^ 0xa6a1, u64::from(at));
         let mut onward = Random::new(seed ^ 0xa6a2, u64::from(at));
+        self.forget(chosen);
         for &(cell, parts) in chosen {
-            match std::mem::replace(&mut self.cells[cell as usize], AGAIN) {
-                BELOW => {}
-                ended => {
-                    self.counted -= 1.0;
-                    match ended {
-                        ESCAPED => self.escaped -= Vec3::ONE,
-                        ABSORBED => self.absorbed -= Vec3::ONE,
-                        _ => {}
-                    }
-                }
+            let ended = std::mem::replace(&mut self.cells[cell as usize], AGAIN);
+            self.counted -= if ended == BELOW { 0.0 } else { 1.0 };
+            match ended {
+                ESCAPED => self.escaped -= Vec3::ONE,
+                ABSORBED => self.absorbed -= Vec3::ONE,
+                _ => {}
             }
-            let part = 1.0 / (parts * parts) as f32;
+            let all = (parts * parts) as u32;
             for i in 0..parts * parts {
                 let place = [i % parts, i / parts].map(|k| (k as f64 + random.uniform()) / parts as f64);
-                let met = self.follow(around, vertex, hemisphere.direction(cell as usize, place), part, &mut onward);
+                let direction = hemisphere.direction(cell as usize, place);
+                let met = self.follow(around, vertex, direction, [cell, all], &mut onward);
                 if met < SENDERS {
                     self.fine[parts - 2].push(met);
                 }
@@ -320,7 +356,7 @@ impl Gathered {
 /// what such a probe is lit by.
 fn lit(around: &Surroundings, probes: &Probes, found: &[Gathered], shines: impl Fn(u32) -> bool + Sync) -> Vec<bool> {
     let sees = |found: &Gathered, of: &(dyn Fn(u32) -> bool + Sync)| {
-        found.plain().chain(found.tinted.iter().map(|(sender, _)| *sender)).any(of)
+        found.plain().chain(found.optics.iter().map(|end| end.met).filter(|met| *met < SENDERS)).any(of)
     };
     let first = |found: &Gathered| found.beyond != Vec3::ZERO || sees(found, &shines);
     let mut lit: Vec<bool> = found.par_iter().map(first).collect();

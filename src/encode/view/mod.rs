@@ -237,7 +237,7 @@ impl ViewEncoding {
         let iterations = self.steps(target.viewer);
         let whole = target.viewer.pupil == Pupil::All;
         let pool = match (whole, is_known(target.viewer)) {
-            (true, _) => iterations.clamp(1, 4 * POOL),
+            (true, _) => iterations.clamp(1, POOL),
             (false, true) => KNOWN_POOL,
             (false, false) => POOL,
         };
