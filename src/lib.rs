@@ -144,6 +144,10 @@
 #![cfg_attr(not(feature = "print"), allow(dead_code, unused_imports))]
 
 pub mod calibration;
+// The program: on top of all rooms, no part of the public interface.
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod cli;
 pub mod comparison;
 pub(crate) mod config;
 #[cfg(feature = "display")]

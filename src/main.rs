@@ -1,7 +1,6 @@
-//! The binary `holodrive`: flags as typed → resolved settings → one library call; bars and prose only here.
-
-mod cli;
+//! The binary `holodrive`: all of it is the library's command line, which the Python package starts, too.
 
 fn main() -> std::process::ExitCode {
-    cli::main()
+    let arguments: Vec<_> = std::env::args_os().collect();
+    holodrive::cli::main(&arguments).into()
 }

@@ -5,16 +5,16 @@ use super::bar::Bar;
 use super::report::{Report, count, seconds, step};
 use super::resolve;
 use super::sequence::{self, CELL, SHEET, frame_path};
+use crate::encode::Encoding;
+use crate::field::Grid;
+use crate::panel::Setup;
+use crate::pipeline::{self, Bench};
+use crate::points::{Placement, WhitePoint};
+use crate::progress::Progress;
+use crate::reconstruction::{self, ColorPicture, Picture, View};
+use crate::sequence::{Animation, AnimationFrame, AnimationFrameReport, ContactSheet};
+use crate::{Result, files};
 use glam::DVec2;
-use holodrive::encode::Encoding;
-use holodrive::field::Grid;
-use holodrive::panel::Setup;
-use holodrive::pipeline::{self, Bench};
-use holodrive::points::{Placement, WhitePoint};
-use holodrive::progress::Progress;
-use holodrive::reconstruction::{self, ColorPicture, Picture, View};
-use holodrive::sequence::{Animation, AnimationFrame, AnimationFrameReport, ContactSheet};
-use holodrive::{Result, files};
 use std::path::Path;
 use std::time::Instant;
 
@@ -156,8 +156,8 @@ fn play(
 ) -> Result<()> {
     use super::args::Ahead;
     use super::sequence::state_memory;
-    use holodrive::Error;
-    use holodrive::display::{DisplayFrame, PlaySettings};
+    use crate::Error;
+    use crate::display::{DisplayFrame, PlaySettings};
     use std::sync::mpsc::sync_channel;
     use std::sync::{Arc, Mutex};
 

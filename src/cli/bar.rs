@@ -1,7 +1,7 @@
 //! A progress bar on a terminal, none in a pipe; Ctrl-C.
 
-use holodrive::progress::Progress;
-use holodrive::{Error, files};
+use crate::progress::Progress;
+use crate::{Error, files};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -3,15 +3,15 @@
 use super::args::{BenchCommand, BenchViewsArgs, EncodingsArgs, IterationsArgs};
 use super::bar::Bar;
 use super::report::{Report, seconds};
-use holodrive::comparison::{
+use crate::comparison::{
     ComparedPicture, Effort, VIEW_ENCODINGS, ViewRow, ViewScene, compare, compare_views, encodings, flat_picture,
     markdown, panels, scene_picture, view_cases, views_markdown,
 };
-use holodrive::encode::iterative::{GradientDescent, Start, Target, TargetPlane, gradient_descent};
-use holodrive::field::{Complex32, Fft2};
-use holodrive::names::Named;
-use holodrive::panel::{PanelProfile, Setup};
-use holodrive::{Error, Result, files};
+use crate::encode::iterative::{GradientDescent, Start, Target, TargetPlane, gradient_descent};
+use crate::field::{Complex32, Fft2};
+use crate::names::Named;
+use crate::panel::{PanelProfile, Setup};
+use crate::{Error, Result, files};
 use serde_json::json;
 use std::time::Instant;
 

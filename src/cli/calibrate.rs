@@ -4,14 +4,14 @@ use super::args::{CalibrateCommand, CheckArgs, CurveArgs, FlatnessArgs, PanelArg
 use super::bar::Bar;
 use super::report::{Report, seconds};
 use super::resolve::{self, told_correction};
-use holodrive::calibration::{
+use crate::calibration::{
     Flatness, FrameSeries, Sweep, card_frames, cards, measure_curve, step_frames, wavefront_from_files,
     write_correction, zernike,
 };
-use holodrive::panel::{Modulation, PanelProfile, Setup};
-use holodrive::progress::Progress;
-use holodrive::units::show_length;
-use holodrive::{Error, Result};
+use crate::panel::{Modulation, PanelProfile, Setup};
+use crate::progress::Progress;
+use crate::units::show_length;
+use crate::{Error, Result};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -1,12 +1,12 @@
 //! What keys set in a live show: how the scene stands, in which light and encoding, and how the operator looks at it.
 
 use super::args::ShowArgs;
+use crate::display::{Key, KeyPress};
+use crate::encode::Encoding;
+use crate::live::Look;
+use crate::names::Named;
+use crate::panel::{Modulation, Setup};
 use glam::DVec3;
-use holodrive::display::{Key, KeyPress};
-use holodrive::encode::Encoding;
-use holodrive::live::Look;
-use holodrive::names::Named;
-use holodrive::panel::{Modulation, Setup};
 
 /// Lasers that are offered beside the profile's own, where the panel has a curve for them [m].
 const LASERS: [f64; 4] = [638e-9, 532e-9, 520e-9, 450e-9];

@@ -2,15 +2,15 @@
 
 use super::args::FieldArgs;
 use super::report::Report;
-use holodrive::encode::Encoding;
-use holodrive::field::npy::Content;
-use holodrive::field::stored::{self, Samples, Stored};
-use holodrive::field::{Field, Grid};
-use holodrive::panel::{Frame, Modulation, PanelProfile};
-use holodrive::progress::Progress;
-use holodrive::propagation::{is_same_pitch, resample};
-use holodrive::units::{show_length, show_pitch};
-use holodrive::{Error, Result};
+use crate::encode::Encoding;
+use crate::field::npy::Content;
+use crate::field::stored::{self, Samples, Stored};
+use crate::field::{Field, Grid};
+use crate::panel::{Frame, Modulation, PanelProfile};
+use crate::progress::Progress;
+use crate::propagation::{is_same_pitch, resample};
+use crate::units::{show_length, show_pitch};
+use crate::{Error, Result};
 use std::path::Path;
 
 /// What a file of numbers holds.

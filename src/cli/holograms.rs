@@ -3,20 +3,20 @@
 use super::light::report_gamut;
 use super::load::Points;
 use super::report::{Report, step};
-use holodrive::encode::EncodeReport;
-use holodrive::field::Field;
-use holodrive::field::npy::Content;
-use holodrive::field::stored;
-use holodrive::hologram::Computed;
-use holodrive::names::Named;
-use holodrive::panel::{Frame, Origin, Setup};
-use holodrive::pipeline::{self, Settings};
-use holodrive::points::colour::NAMES;
-use holodrive::points::{Exposure, Multiplexing, Reach, Share, SubFrames};
-use holodrive::progress::Progress;
-use holodrive::reconstruction::colour::laser_powers;
-use holodrive::units::show_length;
-use holodrive::{Error, Result};
+use crate::encode::EncodeReport;
+use crate::field::Field;
+use crate::field::npy::Content;
+use crate::field::stored;
+use crate::hologram::Computed;
+use crate::names::Named;
+use crate::panel::{Frame, Origin, Setup};
+use crate::pipeline::{self, Settings};
+use crate::points::colour::NAMES;
+use crate::points::{Exposure, Multiplexing, Reach, Share, SubFrames};
+use crate::progress::Progress;
+use crate::reconstruction::colour::laser_powers;
+use crate::units::show_length;
+use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -146,7 +146,7 @@ impl Maker<'_> {
         report: &mut Report,
     ) -> Result<Frame> {
         let begin = Instant::now();
-        if let Some(holodrive::encode::Encoding::Planes(planes)) = &self.settings.encode.encoding {
+        if let Some(crate::encode::Encoding::Planes(planes)) = &self.settings.encode.encoding {
             planes.depths.iter().for_each(|z| report.check_side("depths", *z, content.depth));
         }
         let source = Some(self.input.display().to_string());

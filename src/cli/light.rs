@@ -1,12 +1,12 @@
 //! What was done with a scene's light, in lines for people and values for machines.
 
 use super::report::{Report, count, step};
-use holodrive::points::PointCloud;
-use holodrive::points::budget::{Limit, Rays};
-use holodrive::points::colour::{Gamut, Lasers};
-use holodrive::points::depth_map::DepthMap;
-use holodrive::points::{ScenePoints, WhiteLevel};
-use holodrive::units::show_length;
+use crate::points::PointCloud;
+use crate::points::budget::{Limit, Rays};
+use crate::points::colour::{Gamut, Lasers};
+use crate::points::depth_map::DepthMap;
+use crate::points::{ScenePoints, WhiteLevel};
+use crate::units::show_length;
 use serde_json::json;
 
 pub(super) fn report_cloud(cloud: &PointCloud, elapsed: f64, report: &mut Report) {

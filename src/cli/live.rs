@@ -8,17 +8,17 @@ use super::report::{Report, count, seconds};
 use super::resolve;
 use super::screen::show_settings;
 use super::tracker::Tracker;
-use glam::DVec3;
-use holodrive::display::{Display, DisplayFrame, Key, KeyPress, OperatorChoice, PanelLoop, ShowEnd, Turn};
-use holodrive::encode::Encoding;
-use holodrive::live::{
+use crate::display::{Display, DisplayFrame, Key, KeyPress, OperatorChoice, PanelLoop, ShowEnd, Turn};
+use crate::encode::Encoding;
+use crate::live::{
     Board, Detail, LiveHologram, OperatorPicture, PICTURE, Request, Viewer, Watch, Worker, WorkerEvent, draw,
 };
-use holodrive::names::Named;
-use holodrive::panel::{Frame, Setup};
-use holodrive::points::Placement;
-use holodrive::units::show_length;
-use holodrive::{Error, Result, files};
+use crate::names::Named;
+use crate::panel::{Frame, Setup};
+use crate::points::Placement;
+use crate::units::show_length;
+use crate::{Error, Result, files};
+use glam::DVec3;
 use serde_json::{Value, json};
 use std::io::Write;
 use std::sync::Arc;
@@ -163,7 +163,7 @@ fn request(args: &ShowArgs, setup: &Setup, choices: &Choices, controls: &Control
     // What cannot be is not asked for; warnings of a profile were told at the beginning.
     let eye = eye + controls.eye_aside();
     if let Some(Encoding::View(_)) = encode.encoding {
-        resolve::check_viewer(&holodrive::light_field::Viewer::at(eye), setup)?;
+        resolve::check_viewer(&crate::light_field::Viewer::at(eye), setup)?;
     } else {
         encode.settings(setup, wavelength, Some(content))?;
     }

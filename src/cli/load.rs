@@ -2,22 +2,20 @@
 
 use super::light::{report_cloud, report_light, report_map};
 use super::report::Report;
+use crate::field::arrays;
+use crate::field::npy::Content;
+use crate::light_field::LightField;
+use crate::panel::Setup;
+use crate::pipeline;
+use crate::points::depth_map::DepthReading;
+use crate::points::images::RgbDepth;
+use crate::points::placement::Phase;
+use crate::points::{Axes, LitScene, Placement, PointCloud, Reach, ScenePoints, SceneSettings, clouds, images, ply};
+use crate::progress::Progress;
+use crate::scene::gltf;
+use crate::units;
+use crate::{Error, Result};
 use glam::DVec3;
-use holodrive::field::arrays;
-use holodrive::field::npy::Content;
-use holodrive::light_field::LightField;
-use holodrive::panel::Setup;
-use holodrive::pipeline;
-use holodrive::points::depth_map::DepthReading;
-use holodrive::points::images::RgbDepth;
-use holodrive::points::placement::Phase;
-use holodrive::points::{
-    Axes, LitScene, Placement, PointCloud, Reach, ScenePoints, SceneSettings, clouds, images, ply,
-};
-use holodrive::progress::Progress;
-use holodrive::scene::gltf;
-use holodrive::units;
-use holodrive::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

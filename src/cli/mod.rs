@@ -37,24 +37,25 @@ mod steps;
 mod tracker;
 mod usage;
 
+use crate::Error;
 use args::{Cli, Command};
 use clap::FromArgMatches;
 use clap::error::ErrorKind;
-use holodrive::Error;
-use std::process::ExitCode;
+use std::ffi::OsString;
 
 /// Refuses what needs a display in a build that has none.
 #[cfg(not(feature = "display"))]
-fn without_display(asked: bool) -> holodrive::Result<()> {
+fn without_display(asked: bool) -> crate::Result<()> {
     match asked {
         true => Err(Error::unsupported("this build has no display; build it with the feature `display` (the default)")),
         false => Ok(()),
     }
 }
 
-/// Parses, runs and maps the outcome to an exit code: 0 done, 2 bad flags or input, 130 interrupted.
-pub(crate) fn main() -> ExitCode {
-    let parsed = args::command().try_get_matches().and_then(|typed| {
+/// Parses the arguments, the program's own name first, runs, and maps the outcome to an exit code: 0 done, 2 bad flags or input,
+/// 130 interrupted.
+pub fn main(arguments: &[OsString]) -> u8 {
+    let parsed = args::command(arguments).try_get_matches_from(arguments).and_then(|typed| {
         let mut cli = Cli::from_arg_matches(&typed)?;
         usage::tell(&mut cli.command, &typed);
         Ok(cli)
@@ -64,11 +65,11 @@ pub(crate) fn main() -> ExitCode {
         Err(refused) if matches!(refused.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
             // Help into a closed pipe (`holodrive --help | head -1`) is no failure.
             let _ = refused.print();
-            return ExitCode::SUCCESS;
+            return 0;
         }
         Err(refused) => {
-            eprintln!("{}", refusal::one_line(&refusal::of_flags(&refused)));
-            return ExitCode::from(2);
+            eprintln!("{}", refusal::one_line(&refusal::of_flags(&refused, arguments)));
+            return 2;
         }
     };
     let json = cli.json;
@@ -94,7 +95,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Doctor(args) => monitors::doctor(&args),
     };
     match outcome.and_then(|report| standard::end(standard, report, json)) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(error) => {
             match (&error, kept) {
                 (Error::Interrupted, Some(folder)) => {
@@ -103,9 +104,9 @@ pub(crate) fn main() -> ExitCode {
                         "holodrive: interrupted; the tiles that are done are kept in {folder}: the same command goes on from there"
                     );
                 }
-                _ => eprintln!("{}", refusal::one_line(&refusal::of_work(&error))),
+                _ => eprintln!("{}", refusal::one_line(&refusal::of_work(&error, arguments))),
             }
-            ExitCode::from(if matches!(error, Error::Interrupted) { 130 } else { 2 })
+            if matches!(error, Error::Interrupted) { 130 } else { 2 }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::args::{DoctorArgs, MonitorsArgs};
 use super::report::Report;
-use holodrive::Result;
+use crate::Result;
 
 #[cfg(feature = "display")]
 pub(super) use real::{doctor, monitors};
@@ -10,9 +10,9 @@ pub(super) use real::{doctor, monitors};
 #[cfg(feature = "display")]
 mod real {
     use super::{DoctorArgs, MonitorsArgs, Report, Result};
-    use holodrive::display::{self, Display, Monitor, MonitorChoice};
-    use holodrive::panel::PanelProfile;
-    use holodrive::{Error, files};
+    use crate::display::{self, Display, Monitor, MonitorChoice};
+    use crate::panel::PanelProfile;
+    use crate::{Error, files};
     use serde::Serialize;
     use serde_json::Value;
     use std::path::Path;
@@ -88,6 +88,6 @@ pub(super) fn doctor(_: &DoctorArgs) -> Result<Report> {
 }
 
 #[cfg(not(feature = "display"))]
-fn no_display() -> holodrive::Error {
-    holodrive::Error::unsupported("this build has no display; build it with the feature `display` (the default)")
+fn no_display() -> crate::Error {
+    crate::Error::unsupported("this build has no display; build it with the feature `display` (the default)")
 }

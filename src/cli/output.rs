@@ -1,8 +1,8 @@
 //! What the name of an output says: the kind of file that is written, known before the work is done.
 
-use holodrive::field::arrays::{self, Named, Values};
-use holodrive::panel::Frame;
-use holodrive::{Error, Result};
+use crate::field::arrays::{self, Named, Values};
+use crate::panel::Frame;
+use crate::{Error, Result};
 use std::path::Path;
 
 /// Kinds of file that a frame is written as.

@@ -1,9 +1,9 @@
 //! What is said of the pictures of a hologram.
 
 use super::report::{Report, count, seconds};
-use holodrive::points::ScenePoints;
-use holodrive::reconstruction::Gallery;
-use holodrive::units::show_length;
+use crate::points::ScenePoints;
+use crate::reconstruction::Gallery;
+use crate::units::show_length;
 use std::time::Instant;
 
 pub(super) fn report_gallery(

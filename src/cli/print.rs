@@ -3,12 +3,12 @@
 use super::args::{ExportArgs, FileArgs, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs, White};
 use super::bar::Bar;
 use super::report::{Report, count, seconds};
-use holodrive::print::export::{Format, Frames, export};
-use holodrive::print::preview::PreviewSettings;
-use holodrive::print::{Manifest, Plan, Plate, PlateJob, PlateView, PrintSettings, Shard, folder};
-use holodrive::segments::SceneOptions;
-use holodrive::units::show_length;
-use holodrive::{Error, Result};
+use crate::print::export::{Format, Frames, export};
+use crate::print::preview::PreviewSettings;
+use crate::print::{Manifest, Plan, Plate, PlateJob, PlateView, PrintSettings, Shard, folder};
+use crate::segments::SceneOptions;
+use crate::units::show_length;
+use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
 pub(super) fn print(args: &PrintArgs, json: bool) -> Result<Report> {

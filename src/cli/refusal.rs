@@ -1,15 +1,16 @@
 //! What is said of flags and input that are refused: one line, with the flag that is meant and where its help is.
 
 use super::args;
+use crate::Error;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use holodrive::Error;
+use std::ffi::OsString;
 
 /// The command that was typed, as far as its names go, and what it is called.
-fn typed() -> (Command, String) {
-    let (mut command, mut path) = (args::command(), "holodrive".to_owned());
-    for word in std::env::args().skip(1).filter(|word| !word.starts_with('-')) {
-        let Some(next) = command.find_subcommand(&word).cloned() else { break };
+fn typed(arguments: &[OsString]) -> (Command, String) {
+    let (mut command, mut path) = (args::command(arguments), "holodrive".to_owned());
+    for word in arguments.iter().skip(1).filter(|word| !word.as_encoded_bytes().starts_with(b"-")) {
+        let Some(next) = command.find_subcommand(word).cloned() else { break };
         path = format!("{path} {}", next.get_name());
         command = next;
     }
@@ -17,8 +18,8 @@ fn typed() -> (Command, String) {
 }
 
 /// clap's own words without its layout: the first paragraph, what was probably meant, and where the help is.
-pub(super) fn of_flags(refused: &clap::Error) -> String {
-    let (command, path) = typed();
+pub(super) fn of_flags(refused: &clap::Error, arguments: &[OsString]) -> String {
+    let (command, path) = typed(arguments);
     let all = || command.get_subcommands().map(Command::get_name).collect::<Vec<_>>().join(", ");
     let words = match refused.kind() {
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand | ErrorKind::MissingSubcommand => {
@@ -84,13 +85,13 @@ pub(super) fn one_line(text: &str) -> String {
 }
 
 /// An error of the library; a setting that the command has a flag for is called by the flag's name.
-pub(super) fn of_work(error: &Error) -> String {
+pub(super) fn of_work(error: &Error, arguments: &[OsString]) -> String {
     let said = without_number(&error.to_string());
     let (Error::Parameter { name, .. } | Error::OutOfRange { name, .. }) = error else {
         return format!("holodrive: {said}");
     };
     let long = name.replace(' ', "-");
-    let (command, _) = typed();
+    let (command, _) = typed(arguments);
     let known = command.get_arguments().any(|flag| flag.get_long() == Some(long.as_str()));
     match said.strip_prefix(name) {
         Some(rest) if known => format!("holodrive: --{long}{rest}"),

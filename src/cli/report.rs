@@ -1,8 +1,8 @@
 //! What a command did: lines for people, JSON for machines.
 
 use super::bar::aside;
-use holodrive::units::show_length;
-use holodrive::{Error, Result, files};
+use crate::units::show_length;
+use crate::{Error, Result, files};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::io::Write;

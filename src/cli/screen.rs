@@ -2,12 +2,12 @@
 
 use super::args::{Ahead, ShowArgs};
 use super::report::{Report, count, seconds};
-use holodrive::display::{
+use crate::display::{
     self, Display, DisplayFrame, FrameTime, PlayReport, PlaySettings, Presenter, ShowSettings, WindowSettings,
 };
-use holodrive::panel::Frame;
-use holodrive::progress::Progress;
-use holodrive::{Error, Result};
+use crate::panel::Frame;
+use crate::progress::Progress;
+use crate::{Error, Result};
 use std::collections::VecDeque;
 use std::io::Write;
 use std::path::PathBuf;

@@ -4,11 +4,11 @@ use super::args::{ComputeArgs, PlacementArg, PlacementArgs};
 use super::load::Input;
 use super::print::scene_options;
 use super::report::{Report, count, seconds};
-use holodrive::field::{npy, stored};
-use holodrive::panel::Setup;
-use holodrive::progress::Progress;
-use holodrive::segments::{Object, ObjectWave, Segments, Viewing};
-use holodrive::{Error, Result};
+use crate::field::{npy, stored};
+use crate::panel::Setup;
+use crate::progress::Progress;
+use crate::segments::{Object, ObjectWave, Segments, Viewing};
+use crate::{Error, Result};
 
 pub(super) fn compute(
     args: &ComputeArgs,

@@ -4,14 +4,14 @@ use super::args::{ServeArgs, ServedLevelsArg};
 use super::bar::Bar;
 use super::report::{Report, seconds};
 use super::resolve::{self, told_correction};
-use holodrive::panel::{Frame, Modulation, Setup};
-use holodrive::progress::Progress;
-use holodrive::serve::{
+use crate::panel::{Frame, Modulation, Setup};
+use crate::progress::Progress;
+use crate::serve::{
     self, Announcement, Driver, KeepReport, KeepSettings, OnClientGone, Output, ServeSettings, ServedPanel, Server,
     SimulatedOutput,
 };
-use holodrive::units::show_length;
-use holodrive::{Error, Result, files};
+use crate::units::show_length;
+use crate::{Error, Result, files};
 use serde_json::json;
 use std::io::Write;
 use std::net::SocketAddr;
@@ -63,7 +63,7 @@ fn on_monitor(
     progress: &Progress,
     report: &mut Report,
 ) -> Result<KeepReport> {
-    use holodrive::display::{Display, DisplayFrame, OnAbsence, PanelLoop, ShowEnd, ShowSettings};
+    use crate::display::{Display, DisplayFrame, OnAbsence, PanelLoop, ShowEnd, ShowSettings};
     if args.output.is_some() {
         let what = "frames are written on the simulated panel only; give --monitor none, or leave it out";
         return Err(Error::parameter("--output", what));

@@ -12,14 +12,14 @@ use super::resolve;
 use super::sequence::{self, Sequence};
 use super::shown::{Shown, usual};
 use super::steps::write_traced;
-use holodrive::encode::Encoding;
-use holodrive::field::npy::Content;
-use holodrive::light_field::{LightField, Retina};
-use holodrive::panel::{Frame, Setup};
-use holodrive::pipeline::Settings;
-use holodrive::points::ply;
-use holodrive::progress::Progress;
-use holodrive::{Error, Result, files};
+use crate::encode::Encoding;
+use crate::field::npy::Content;
+use crate::light_field::{LightField, Retina};
+use crate::panel::{Frame, Setup};
+use crate::pipeline::Settings;
+use crate::points::ply;
+use crate::progress::Progress;
+use crate::{Error, Result, files};
 use std::time::Instant;
 
 /// Runs the whole way; a folder that was made for nothing is taken away again.

@@ -6,15 +6,15 @@ use super::load::{Input, Points};
 use super::pictures::report_gallery;
 use super::report::Report;
 use super::resolve;
-use holodrive::Result;
-use holodrive::encode::{Encoding, ViewEncoding};
-use holodrive::field::npy::Content;
-use holodrive::light_field::{LightField, Retina, Viewer};
-use holodrive::panel::{Frame, Modulation, Setup};
-use holodrive::pipeline::{self, Settings};
-use holodrive::progress::Progress;
-use holodrive::reconstruction::{Target, sharpest};
-use holodrive::units::show_length;
+use crate::Result;
+use crate::encode::{Encoding, ViewEncoding};
+use crate::field::npy::Content;
+use crate::light_field::{LightField, Retina, Viewer};
+use crate::panel::{Frame, Modulation, Setup};
+use crate::pipeline::{self, Settings};
+use crate::progress::Progress;
+use crate::reconstruction::{Target, sharpest};
+use crate::units::show_length;
 use std::time::Instant;
 
 /// Frames of one picture, and what is known of it.

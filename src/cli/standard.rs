@@ -2,7 +2,7 @@
 
 use super::args::Command;
 use super::report::Report;
-use holodrive::{Error, Result};
+use crate::{Error, Result};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,8 @@
 //! A file that says where the eye is, as whatever tracks it writes it.
 
 use super::args::position;
+use crate::{Error, Result};
 use glam::DVec3;
-use holodrive::{Error, Result};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -4,9 +4,9 @@ use super::args::{self, Command, Group, ShowArgs, unused};
 use super::load::{Input, input};
 use super::sequence::{self, Sequence};
 use super::shown::usual;
+use crate::encode::Encoding;
+use crate::panel::{PanelProfile, Setup};
 use clap::ArgMatches;
-use holodrive::encode::Encoding;
-use holodrive::panel::{PanelProfile, Setup};
 use std::path::Path;
 
 /// What an input is, and the groups of flags that its way to light goes through.
@@ -86,6 +86,6 @@ fn used(command: &mut Command) -> Option<(&mut Option<String>, Use)> {
 /// Tells a command with an input which typed flags are of no use for it.
 pub(super) fn tell(command: &mut Command, typed: &ArgMatches) {
     if let (Some((name, typed)), Some((idle, (input, groups)))) = (typed.subcommand(), used(command)) {
-        *idle = args::command().find_subcommand(name).and_then(|own| unused(own, typed, &groups, input));
+        *idle = args::command(&[]).find_subcommand(name).and_then(|own| unused(own, typed, &groups, input));
     }
 }

@@ -4,7 +4,8 @@ Start the program, which keeps the panel (``--monitor none`` instead simulates i
 
     holodrive serve --panel holoeye-pluto-2.1 --monitor HDMI-1
 
-then, with this file beside your script or on ``PYTHONPATH`` (``holodrive serve --write-python holodrive.py`` writes it)::
+then, with this file beside your script or on ``PYTHONPATH`` (``holodrive serve --write-python holodrive.py`` writes it; the package
+``holodrive`` holds it, too)::
 
     import numpy as np, holodrive
 
@@ -16,33 +17,53 @@ then, with this file beside your script or on ``PYTHONPATH`` (``holodrive serve 
 Only Python's standard library and NumPy are used. MIT OR Apache-2.0.
 """
 
-import collections
+from __future__ import annotations
+
+import asyncio
 import glob
 import json
 import mmap
 import os
 import socket
+import threading
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, Optional, Tuple, Type, Union
 
 import numpy as np
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 __all__ = ["SLM", "Error", "Shown"]
 
-#: When and how a frame came on the panel: ``time`` of its flip [s] on the clock of ``time.monotonic()``, running ``number``
-#: of the frame on this panel, ``missed`` refreshes beside the one that every frame waits for, and ``latency`` [s] from the
-#: request's arrival to the flip.
-Shown = collections.namedtuple("Shown", "time number missed latency")
+if __package__:
+    # In the package it is one of its errors.
+    from ._errors import DisplayError as Error
+else:
+
+    class Error(RuntimeError):  # type: ignore[no-redef]
+        """The program refused: its own words, which say what to change."""
 
 
-class Error(RuntimeError):
-    """The program refused: its own words, which say what to change."""
+class Shown(NamedTuple):
+    """When and how a frame came on the panel."""
+
+    #: Of the flip [s], on the clock of ``time.monotonic()``.
+    time: float
+    #: Running number of the frame on this panel.
+    number: int
+    #: Refreshes beside the one that every frame waits for.
+    missed: int
+    #: From the request's arrival to the flip [s].
+    latency: float
 
 
-def _folder():
+def _folder() -> str:
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     return os.path.join(runtime, "holodrive") if os.path.isabs(runtime) else "/tmp/holodrive-%d" % os.geteuid()
 
 
-def _find(name):
+def _find(name: Optional[str]) -> str:
     if name is not None:
         return os.path.join(_folder(), name + ".sock")
     found = sorted(glob.glob(os.path.join(_folder(), "*.sock")))
@@ -55,7 +76,7 @@ def _find(name):
 
 
 class SLM:
-    """A panel that ``holodrive serve`` keeps on this machine.
+    """A panel that ``holodrive serve`` keeps on this machine. Several threads may use one: their frames are shown one after another.
 
     :param name: the panel's name (``--name``, else its profile's); may be left out where one panel is served.
     :param path: its socket, where ``--local`` put it elsewhere.
@@ -65,12 +86,28 @@ class SLM:
     ``pixel_pitch`` ``(x, y)`` [m]; ``wavelength`` [m]; ``settle_time`` [s] from flip to settled light.
     """
 
-    def __init__(self, name=None, path=None, timeout=10.0):
-        self._map = self._lines = None
+    name: str
+    shape: Tuple[int, int]
+    bits: int
+    modulation: str
+    pixel_pitch: Tuple[float, float]
+    wavelength: float
+    settle_time: float
+
+    def __init__(
+        self,
+        name: Optional[str] = None,
+        path: Optional[Union[str, os.PathLike[str]]] = None,
+        timeout: float = 10.0,
+    ) -> None:
+        self._map: Optional[mmap.mmap] = None
+        self._lines: Optional[BinaryIO] = None
+        # The array lies in memory that is shared with the program, and an answer is that of the request before it: one at a time.
+        self._turn = threading.RLock()
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             self._socket.settimeout(timeout)
-            path = _find(name) if path is None else path
+            path = _find(name) if path is None else os.fspath(path)
             try:
                 self._socket.connect(path)
             except OSError as error:
@@ -93,7 +130,7 @@ class SLM:
             self.close()
             raise
 
-    def show(self, array):
+    def show(self, array: ArrayLike) -> Shown:
         """Shows an array of the panel's shape and returns when it is on the panel, as :class:`Shown`.
 
         Floating-point numbers are phases in radians, of any turn (on an amplitude panel: transmittances 0 … 1); they go
@@ -115,28 +152,46 @@ class SLM:
             kind, dtype = "levels", "uint8" if highest < 256 else "uint16"
         else:
             raise ValueError("the array is of %s; give phases (float) or levels (integer)" % array.dtype)
-        if self._map is None:
-            raise Error("this SLM is closed")
-        np.ndarray(self.shape, dtype, self._map)[...] = array
-        answer = self._ask({"show": kind, "dtype": dtype})
+        with self._turn:
+            # It may have been closed while another thread had its turn.
+            if self._map is None:
+                raise Error("this SLM is closed")
+            np.ndarray(self.shape, dtype, self._map)[...] = array
+            answer = self._ask({"show": kind, "dtype": dtype})
         return Shown(answer["time"], answer["number"], answer["missed"], answer["latency"])
 
-    def close(self):
-        """Ends the connection; what stays on the panel is as ``holodrive serve --on-client-gone`` says."""
-        if self._lines is not None:
-            self._lines.close()
-        self._socket.close()
-        if self._map is not None:
-            self._map, shared = None, self._map
-            shared.close()
+    async def show_async(self, array: ArrayLike) -> Shown:
+        """The same for ``await``: the event loop goes on while the frame comes on the panel."""
+        return await asyncio.get_running_loop().run_in_executor(None, self.show, array)
 
-    def __enter__(self):
+    def close(self) -> None:
+        """Ends the connection; what stays on the panel is as ``holodrive serve --on-client-gone`` says."""
+        with self._turn:
+            if self._lines is not None:
+                self._lines.close()
+            self._socket.close()
+            if self._map is not None:
+                self._map, shared = None, self._map
+                shared.close()
+
+    def __enter__(self) -> SLM:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        value: Optional[BaseException],
+        trace: Optional[TracebackType],
+    ) -> None:
         self.close()
 
-    def _ask(self, request):
+    def __repr__(self) -> str:
+        if self._map is None:
+            return "<holodrive.SLM, closed>"
+        rows, columns = self.shape
+        return "<holodrive.SLM %s, %d × %d px of %d bits>" % (self.name, columns, rows, self.bits)
+
+    def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
         try:
             self._socket.sendall(json.dumps(request).encode() + b"\n")
         except OSError as error:
@@ -144,7 +199,8 @@ class SLM:
             raise Error("the program has ended: %s" % error) from error
         return self._answer()
 
-    def _answer(self):
+    def _answer(self) -> dict[str, Any]:
+        assert self._lines is not None
         try:
             line = self._lines.readline(1 << 20)
         except OSError as error:
@@ -158,7 +214,7 @@ class SLM:
         if not line.endswith(b"\n"):
             self.close()
             raise Error("the program has ended")
-        answer = json.loads(line)
+        answer: dict[str, Any] = json.loads(line)
         if "error" in answer:
             raise Error(answer["error"])
         return answer

@@ -1,8 +1,8 @@
 //! Flags of `bench`.
 
 use super::parse::{one_of, size};
+use crate::encode::{Encoding, PlaneStart};
 use clap::{Args, Subcommand};
-use holodrive::encode::{Encoding, PlaneStart};
 use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]

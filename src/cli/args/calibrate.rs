@@ -2,9 +2,9 @@
 
 use super::panel::PanelArgs;
 use super::parse::{one_of, size};
+use crate::calibration::Order;
+use crate::units;
 use clap::{Args, Subcommand};
-use holodrive::calibration::Order;
-use holodrive::units;
 use std::path::PathBuf;
 
 /// What is calibrated.

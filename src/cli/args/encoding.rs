@@ -1,9 +1,9 @@
 //! Flags of encodings.
 
 use super::parse::{angles, one_of};
+use crate::encode::{Encoding, PlaneStart};
+use crate::units;
 use clap::Args;
-use holodrive::encode::{Encoding, PlaneStart};
-use holodrive::units;
 
 /// How a field or picture becomes what the panel can show.
 #[derive(Clone, Debug, Args)]

@@ -1,10 +1,10 @@
 //! Flags of how a field is computed.
 
 use super::parse::one_of;
+use crate::hologram::Method;
+use crate::points::Channel;
+use crate::units;
 use clap::Args;
-use holodrive::hologram::Method;
-use holodrive::points::Channel;
-use holodrive::units;
 
 /// How the field is computed.
 #[derive(Clone, Debug, Args)]

@@ -42,6 +42,7 @@ pub(crate) use viewer::ViewerArgs;
 pub(crate) use views::ViewsArgs;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use std::ffi::OsString;
 
 const EXIT_CODES: &str = "\
 Exit codes: 0 done; 2 wrong flags, bad input, or a file or display that refused (one line says what, where and what to do; \
@@ -66,9 +67,9 @@ Depths are z from the panel, negative behind it and positive in front of it:
 
 /// The whole grammar. For one release the old `--method` is a hidden name of `compute`'s `--engine`, as it is of
 /// `--encoding` elsewhere.
-pub(crate) fn command() -> clap::Command {
+pub(crate) fn command(arguments: &[OsString]) -> clap::Command {
     // clap lists the names of closed sets in both helps, or in none.
-    let short = std::env::args_os().any(|typed| typed == "-h");
+    let short = arguments.iter().any(|typed| typed == "-h");
     Cli::command().mut_subcommands(|command| match command.get_name() {
         "compute" => dressed(command, short).mut_arg("engine", |engine| engine.alias("method")),
         // What it makes for an eye needs no field.

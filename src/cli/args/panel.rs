@@ -1,8 +1,8 @@
 //! Flags of the panel and of the light on it.
 
 use super::parse::{Wavelengths, wavelengths};
+use crate::units;
 use clap::Args;
-use holodrive::units;
 
 /// Which panel.
 #[derive(Clone, Debug, Args)]

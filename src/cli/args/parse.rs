@@ -1,9 +1,9 @@
 //! Values as they are typed.
 
+use crate::names::Named;
+use crate::points::budget::Budget;
+use crate::{Result, units};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use holodrive::names::Named;
-use holodrive::points::budget::Budget;
-use holodrive::{Result, units};
 
 /// A value of a closed set, by its name; help and errors list the names.
 pub(super) fn one_of<T: Named + Clone + Send + Sync>() -> impl TypedValueParser<Value = T> {

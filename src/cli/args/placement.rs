@@ -1,11 +1,11 @@
 //! Flags of where a scene stands before the panel.
 
 use super::parse::{one_of, range};
+use crate::points::Axes;
+use crate::points::depth_map::{DepthReading, DepthScale};
+use crate::points::placement::Phase;
+use crate::units;
 use clap::{Args, ValueEnum};
-use holodrive::points::Axes;
-use holodrive::points::depth_map::{DepthReading, DepthScale};
-use holodrive::points::placement::Phase;
-use holodrive::units;
 
 /// Where the scene stands before the panel.
 #[derive(Clone, Debug, Args)]

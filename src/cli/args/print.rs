@@ -2,9 +2,9 @@
 
 use super::parse::{White, one_of, part, position, size, white};
 use super::scene::FileArgs;
+use crate::print::export::Format;
+use crate::units;
 use clap::{Args, Subcommand};
-use holodrive::print::export::Format;
-use holodrive::units;
 use std::path::PathBuf;
 
 /// Fringes of a plate into a folder, and what is done with such a folder.

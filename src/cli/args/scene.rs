@@ -1,12 +1,12 @@
 //! Flags of scenes: what of a file is taken, how it is lit and traced.
 
 use super::parse::{White, budget, one_of, size, white};
+use crate::illumination::FormFactor;
+use crate::points::budget::Budget;
+use crate::points::trace::MirrorDepth;
+use crate::scene::environment::Panorama;
+use crate::units;
 use clap::Args;
-use holodrive::illumination::FormFactor;
-use holodrive::points::budget::Budget;
-use holodrive::points::trace::MirrorDepth;
-use holodrive::scene::environment::Panorama;
-use holodrive::units;
 use std::path::PathBuf;
 
 /// What of a file is taken, and the light that is added to it.

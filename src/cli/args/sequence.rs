@@ -1,9 +1,9 @@
 //! Flags of frames in time.
 
 use super::parse::{Ahead, ahead, one_of, size};
+use crate::sequence::RawFormat;
+use crate::units;
 use clap::Args;
-use holodrive::sequence::RawFormat;
-use holodrive::units;
 use std::path::PathBuf;
 
 /// How frames in time are read and played.

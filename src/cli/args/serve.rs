@@ -2,10 +2,10 @@
 
 use super::panel::PanelArgs;
 use super::parse::one_of;
-use clap::{Args, ValueEnum};
 #[cfg(feature = "display")]
-use holodrive::display::Presenter;
-use holodrive::serve::OnClientGone;
+use crate::display::Presenter;
+use crate::serve::OnClientGone;
+use clap::{Args, ValueEnum};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 

@@ -10,10 +10,10 @@ use super::placement::{DepthMapArgs, PlacementArgs};
 use super::scene::SceneArgs;
 use super::sequence::SequenceArgs;
 use super::viewer::ViewerArgs;
-use clap::Args;
 #[cfg(feature = "display")]
-use holodrive::display::{OnAbsence, Presenter};
-use holodrive::units;
+use crate::display::{OnAbsence, Presenter};
+use crate::units;
+use clap::Args;
 use std::path::PathBuf;
 
 /// Where pictures and data go if nothing is said.

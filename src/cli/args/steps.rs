@@ -8,10 +8,10 @@ use super::parse::{lengths, one_of, position, size};
 use super::placement::{DepthMapArgs, PlacementArgs};
 use super::scene::SceneArgs;
 use super::viewer::ViewerArgs;
+use crate::points::ply::Frame;
+use crate::propagation::Kernel;
+use crate::units;
 use clap::Args;
-use holodrive::points::ply::Frame;
-use holodrive::propagation::Kernel;
-use holodrive::units;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]

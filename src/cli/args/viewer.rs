@@ -1,9 +1,9 @@
 //! Flags of who looks.
 
 use super::parse::{lengths, position};
+use crate::light_field::Pupil;
+use crate::units;
 use clap::Args;
-use holodrive::light_field::Pupil;
-use holodrive::units;
 
 /// Who looks, and from where: what `--encoding view` is made for, and what is judged.
 #[derive(Clone, Debug, Args)]
@@ -22,7 +22,7 @@ pub(crate) struct ViewerArgs {
     pub(crate) eye_box: Option<[f64; 2]>,
 }
 
-fn pupil(text: &str) -> holodrive::Result<Pupil> {
+fn pupil(text: &str) -> crate::Result<Pupil> {
     match text {
         "all" => Ok(Pupil::All),
         _ => units::positive_length(text).map(Pupil::Diameter),

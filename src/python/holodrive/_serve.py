@@ -1,0 +1,157 @@
+"""``holodrive serve`` in the background."""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from types import TracebackType
+from typing import IO, Any, Optional, Sequence, Type, Union
+
+from ._errors import DisplayError
+from .slm import SLM
+
+__all__ = ["Served", "serve"]
+
+_Path = Union[str, "os.PathLike[str]"]
+
+
+class Served:
+    """A panel that a program of its own keeps until it is stopped; made by :func:`serve`.
+
+    Attributes: ``name`` by which clients ask for the panel; ``about``, a dict of what the program said: width, height, bits,
+    wavelength, the addresses of its protocols; ``process``.
+    """
+
+    def __init__(self, command: Sequence[str], timeout: float) -> None:
+        self.process: "subprocess.Popen[str]" = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        assert self.process.stdout is not None and self.process.stderr is not None
+        self._said: "queue.Queue[Optional[str]]" = queue.Queue()
+        self._errors: "list[str]" = []
+        # Both pipes are read to their ends, so that the program never waits for a reader.
+        self._readers = [
+            threading.Thread(target=self._read, args=(self.process.stdout,), daemon=True),
+            threading.Thread(target=self._read_errors, args=(self.process.stderr,), daemon=True),
+        ]
+        for reader in self._readers:
+            reader.start()
+        try:
+            first = self._said.get(timeout=timeout)
+        except queue.Empty:
+            self.stop()
+            raise DisplayError(f"the program did not say within {timeout:g} s that it serves the panel") from None
+        except BaseException:
+            self.stop()
+            raise
+        if first is None:
+            self._readers[1].join(1.0)
+            self.process.wait()
+            raise DisplayError("".join(self._errors).strip() or "the program ended before it served the panel")
+        self.about: "dict[str, Any]" = json.loads(first)["serving"]
+        self.name: str = self.about["name"]
+
+    def _read(self, pipe: IO[str]) -> None:
+        for line in pipe:
+            self._said.put(line)
+        self._said.put(None)
+
+    def _read_errors(self, pipe: IO[str]) -> None:
+        for line in pipe:
+            self._errors.append(line)
+
+    def slm(self, timeout: float = 10.0) -> SLM:
+        """Connects to the panel.
+
+        :param timeout: longest wait for an answer [s].
+        """
+        local = self.about.get("local")
+        return SLM(self.name, path=local, timeout=timeout)
+
+    @property
+    def running(self) -> bool:
+        """Whether the program still keeps the panel."""
+        return self.process.poll() is None
+
+    def stop(self, timeout: float = 10.0) -> "dict[str, Any]":
+        """Ends the program as Ctrl-C does, and returns its report: frames shown, refused and missed, latency.
+
+        :param timeout: longest wait for its end [s]; then it is killed.
+        """
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        try:
+            self.process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        for reader in self._readers:
+            reader.join(timeout)
+        lines: "list[str]" = []
+        while not self._said.empty():
+            line = self._said.get()
+            if line is not None:
+                lines.append(line)
+        for line in reversed(lines):
+            try:
+                report = json.loads(line)
+            except ValueError:
+                continue
+            if isinstance(report, dict):
+                return report
+        return {}
+
+    def __enter__(self) -> "Served":
+        return self
+
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        value: Optional[BaseException],
+        trace: Optional[TracebackType],
+    ) -> None:
+        self.stop()
+
+    def __repr__(self) -> str:
+        state = "" if self.running else ", ended"
+        return f"<holodrive.Served {self.name}, {self.about['width']} × {self.about['height']} px{state}>"
+
+
+def serve(
+    panel: _Path = "generic",
+    monitor: str = "none",
+    *,
+    name: Optional[str] = None,
+    wavelength: Optional[str] = None,
+    output: Optional[_Path] = None,
+    arguments: Sequence[str] = (),
+    timeout: float = 20.0,
+) -> Served:
+    """Keeps a panel in the background, by the program ``holodrive serve`` in a process of its own.
+
+    ::
+
+        with holodrive.serve("holoeye-pluto-2.1", "HDMI-1") as served, served.slm() as slm:
+            slm.show(phase)
+
+    :param panel: name of a profile, or its .toml file.
+    :param monitor: the panel's monitor (see ``holodrive monitors``), or "none" for the simulated panel.
+    :param name: the name by which clients ask for it; by default the profile's.
+    :param wavelength: of the laser, text with a unit; by default the profile's first.
+    :param output: with monitor "none": a folder into which each frame is written.
+    :param arguments: further arguments of ``holodrive serve``, such as ("--slmsuite", "5025").
+    :param timeout: longest wait until it serves [s].
+    :raises DisplayError: the program's own words, where it could not.
+    """
+    command = [sys.executable, "-m", "holodrive", "serve", "--json", "--panel", os.fspath(panel), "--monitor", monitor]
+    if not any(protocol in arguments for protocol in ("--slmsuite", "--slmpy", "--local")):
+        command += ["--local"]
+    for flag, value in (("--name", name), ("--wavelength", wavelength), ("--output", output)):
+        if value is not None:
+            command += [flag, os.fspath(value)]
+    return Served([*command, *arguments], timeout)

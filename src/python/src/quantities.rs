@@ -1,0 +1,101 @@
+//! Lengths and angles as Python gives them: numbers in SI units, or text with a unit.
+
+use crate::errors::Raise;
+use glam::{DVec2, DVec3};
+use holodrive::names::Named;
+use holodrive::units;
+use pyo3::prelude::*;
+use pyo3::types::PyString;
+
+fn quantity(value: &Borrowed<'_, '_, PyAny>, read: fn(&str) -> holodrive::Result<f64>) -> PyResult<f64> {
+    match value.cast::<PyString>() {
+        Ok(text) => read(&text.to_string_lossy()).raise(value.py()),
+        Err(_) => value.extract(),
+    }
+}
+
+/// A length [m]: a number of metres, or text with a unit such as "8um".
+#[derive(Clone, Copy)]
+pub(crate) struct Length(pub(crate) f64);
+
+impl<'py> FromPyObject<'_, 'py> for Length {
+    type Error = PyErr;
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        quantity(&value, units::length).map(Self)
+    }
+}
+
+/// An angle [rad]: a number of radians, or text with a unit such as "1.1deg".
+#[derive(Clone, Copy)]
+pub(crate) struct Angle(pub(crate) f64);
+
+impl<'py> FromPyObject<'_, 'py> for Angle {
+    type Error = PyErr;
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        quantity(&value, units::angle).map(Self)
+    }
+}
+
+/// An amount of memory [bytes]: a number, or text with a unit such as "2GB".
+#[derive(Clone, Copy)]
+pub(crate) struct Memory(pub(crate) u64);
+
+impl<'py> FromPyObject<'_, 'py> for Memory {
+    type Error = PyErr;
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        match value.cast::<PyString>() {
+            Ok(text) => units::memory(&text.to_string_lossy()).raise(value.py()).map(Self),
+            Err(_) => value.extract().map(Self),
+        }
+    }
+}
+
+/// One length for x and y, or one for each [m].
+#[derive(Clone, Copy)]
+pub(crate) struct Lengths(pub(crate) [f64; 2]);
+
+impl<'py> FromPyObject<'_, 'py> for Lengths {
+    type Error = PyErr;
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok((Length(x), Length(y))) = value.extract::<(Length, Length)>() {
+            return Ok(Self([x, y]));
+        }
+        value.extract::<Length>().map(|Length(both)| Self([both; 2]))
+    }
+}
+
+impl Lengths {
+    pub(crate) fn vector(self) -> DVec2 {
+        DVec2::from_array(self.0)
+    }
+}
+
+/// A place in the hologram frame, (x, y, z) [m].
+#[derive(Clone, Copy)]
+pub(crate) struct Place(pub(crate) DVec3);
+
+impl<'py> FromPyObject<'_, 'py> for Place {
+    type Error = PyErr;
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let (Length(x), Length(y), Length(z)) = value.extract()?;
+        Ok(Self(DVec3::new(x, y, z)))
+    }
+}
+
+/// The value of that name of a closed set.
+pub(crate) fn named<T: Named>(py: Python<'_>, name: &str) -> PyResult<T> {
+    T::named(name).raise(py)
+}
+
+/// Metres of a length with its unit.
+///
+/// >>> import holodrive
+/// >>> holodrive.length("632.8nm"), holodrive.length(0.25)
+/// (6.328e-07, 0.25)
+///
+/// :param value: text such as "8um", "632.8nm", "0.25m", or a number of metres.
+/// :raises ParameterError: the text has no unit, or one that is no length's.
+#[pyfunction]
+pub(crate) fn length(value: Length) -> f64 {
+    value.0
+}
