@@ -139,6 +139,9 @@
 //! 24. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
 //! 25. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols, a local one for Python; the panel kept for them
 //! 26. [`display`]: monitors and the fullscreen window (feature `display`)
+//!
+//! On top of them stand two entrances that hold no physics: `cli`, the program, and the package for Python in `src/python`, a crate
+//! of its own, which starts the same program.
 
 // Rooms below the plates hold some things that plates alone use.
 #![cfg_attr(not(feature = "print"), allow(dead_code, unused_imports))]

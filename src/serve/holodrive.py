@@ -171,7 +171,7 @@ class SLM:
                 self._lines.close()
             self._socket.close()
             if self._map is not None:
-                self._map, shared = None, self._map
+                shared, self._map = self._map, None
                 shared.close()
 
     def __enter__(self) -> SLM:

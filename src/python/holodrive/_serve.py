@@ -34,6 +34,7 @@ class Served:
         assert self.process.stdout is not None and self.process.stderr is not None
         self._said: "queue.Queue[Optional[str]]" = queue.Queue()
         self._errors: "list[str]" = []
+        self._report: "dict[str, Any]" = {}
         # Both pipes are read to their ends, so that the program never waits for a reader.
         self._readers = [
             threading.Thread(target=self._read, args=(self.process.stdout,), daemon=True),
@@ -92,19 +93,15 @@ class Served:
             self.process.wait()
         for reader in self._readers:
             reader.join(timeout)
-        lines: "list[str]" = []
+        said = ""
         while not self._said.empty():
-            line = self._said.get()
-            if line is not None:
-                lines.append(line)
-        for line in reversed(lines):
-            try:
-                report = json.loads(line)
-            except ValueError:
-                continue
-            if isinstance(report, dict):
-                return report
-        return {}
+            said += self._said.get() or ""
+        try:
+            self._report = json.loads(said)
+        except ValueError:
+            # A program that was killed says nothing.
+            pass
+        return self._report
 
     def __enter__(self) -> "Served":
         return self

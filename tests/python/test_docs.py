@@ -1,0 +1,113 @@
+"""What documentation shows is so: doctests, the README's section, the notebook."""
+
+from __future__ import annotations
+
+import contextlib
+import doctest
+import io
+import inspect
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import holodrive as hd
+import numpy as np
+import pytest
+from conftest import ROOT
+
+PUBLIC = [getattr(hd, name) for name in hd.__all__ if not name.startswith("__")]
+
+
+def members() -> "list[Any]":
+    """Public classes and functions, and the methods of the classes."""
+    found = []
+    for thing in PUBLIC:
+        found.append(thing)
+        if inspect.isclass(thing) and not issubclass(thing, Exception):
+            own = [value for name, value in vars(thing).items() if not name.startswith("_")]
+            found += [value for value in own if callable(value) or inspect.isdatadescriptor(value)]
+    return found
+
+
+def test_examples_in_documentation_give_what_they_say() -> None:
+    np.set_printoptions(legacy=False)
+    finder, count = doctest.DocTestFinder(recurse=False), 0
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
+    said = io.StringIO()
+    for thing in PUBLIC:
+        text = inspect.getdoc(thing) or ""
+        examples = doctest.DocTestParser().get_doctest(text, {}, getattr(thing, "__name__", "?"), None, None)
+        count += len(examples.examples)
+        runner.run(examples, out=said.write)
+    assert runner.summarize(verbose=False).failed == 0, said.getvalue()
+    assert count >= 25 and finder is not None
+
+
+@pytest.mark.parametrize("thing", members(), ids=lambda thing: getattr(thing, "__qualname__", repr(thing)))
+def test_everything_public_is_documented(thing: Any) -> None:
+    text = inspect.getdoc(thing)
+    assert text and len(text) > 8
+    if inspect.isbuiltin(thing) and not inspect.isclass(thing):
+        taken = [name for name in inspect.signature(thing).parameters if name not in ("self", "progress", "path")]
+        missing = [name for name in taken if not re.search(rf"(:param {name}:|`{name}`)", text)]
+        assert not missing, f"{thing.__name__} does not say what {missing} are"
+
+
+def readme() -> str:
+    text = (ROOT / "README.md").read_text()
+    return text[text.index("**From Python.**") :].split("\n**", 1)[0]
+
+
+def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(ROOT / "scenes", tmp_path / "scenes")
+    blocks = re.findall(r"```python library\n(.*?)```", readme(), re.S)
+    assert blocks and len(readme().splitlines()) <= 40
+    names: "dict[str, Any]" = {}
+    for block in blocks:
+        exec(compile(block, "README.md", "exec"), names)
+    assert (tmp_path / "frame.png").exists() and (tmp_path / "near.png").exists()
+
+
+def test_the_readmes_commands_run(tmp_path: Path) -> None:
+    commands = [line for block in re.findall(r"```sh python\n(.*?)```", readme(), re.S) for line in block.splitlines()]
+    assert commands
+    shutil.copytree(ROOT / "scenes", tmp_path / "scenes")
+    for command in commands:
+        # What installs the package has been done: these tests run on it.
+        if "pip install" in command or command.startswith("maturin"):
+            assert "src/python" in command or ".whl" in command
+            continue
+        program, *arguments = command.split()
+        assert program == "holodrive"
+        said = subprocess.run([sys.executable, "-m", "holodrive", *arguments], cwd=tmp_path, capture_output=True, text=True)
+        assert said.returncode == 0, said.stderr
+
+
+def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    book = json.loads((Path(__file__).parent / "first_light.ipynb").read_text())
+    assert book["nbformat"] == 4
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(ROOT / "scenes", tmp_path / "scenes")
+    cells = ["".join(cell["source"]) for cell in book["cells"] if cell["cell_type"] == "code"]
+    assert len(cells) >= 5
+    names: "dict[str, Any]" = {}
+    shown = 0
+    for number, cell in enumerate(cells):
+        *before, last = cell.rstrip().split("\n")
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            exec(compile("\n".join(before), f"cell {number}", "exec"), names)
+            try:
+                value = eval(compile(last, f"cell {number}", "eval"), names)
+            except SyntaxError:
+                exec(compile(last, f"cell {number}", "exec"), names)
+                value = None
+        if hasattr(value, "_repr_png_"):
+            assert value._repr_png_().startswith(b"\x89PNG")
+            shown += 1
+    assert shown >= 3, "a notebook that shows nothing"
