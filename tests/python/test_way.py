@@ -225,6 +225,17 @@ def test_a_plate_is_planned(tmp_path: Path) -> None:
     assert plan["size"][0] > 100 and plan["seconds"] > 0 and not (tmp_path / "plate").exists()
 
 
+def test_a_plate_is_gone_on_with(tmp_path: Path) -> None:
+    source, plate, folder = ROOT / "scenes" / "cornell.gltf", ROOT / "calib" / "plate-small.toml", tmp_path / "plate"
+    part = hd.print_plate(source, plate, folder, shard="0/2")
+    assert not part["complete"] and part["done"]["computed"] == 6
+    told: "list[str]" = []
+    whole = hd.print_plate(source, plate, folder, progress=lambda step, done, total: told.append(step))
+    assert whole["complete"] and whole["done"]["kept"] == 6 and whole["done"]["computed"] == 6 and told
+    with pytest.raises(hd.ParameterError, match="is not i/n"):
+        hd.print_plate(source, plate, folder, shard="half")
+
+
 def test_what_is_shown_says_the_essentials(room: hd.Scene, panel: hd.Panel, points: hd.Points, light: hd.LightField) -> None:
     field = hd.hologram(hd.Points([[0, 0, -0.1]]), panel)
     for thing, words in [

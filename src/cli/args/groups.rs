@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn typed_flags_outside_the_groups_in_use_are_named_and_defaults_are_not() {
         let said = |line: &str, used: &[Group], input: &str| {
-            let mut all = super::super::command();
+            let mut all = super::super::command(&[]);
             let typed = all.try_get_matches_from_mut(line.split(' ')).expect("flags");
             let (name, typed) = typed.subcommand().expect("command");
             unused(all.find_subcommand(name).expect("command"), typed, used, input)

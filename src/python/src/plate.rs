@@ -3,8 +3,7 @@
 use crate::errors::Raise;
 use crate::frame::loaded;
 use crate::run::run;
-use holodrive::print::Plate;
-use holodrive::print::{PlateJob, PrintSettings, Shard};
+use holodrive::print::{Plate, PlateJob, PrintSettings, Shard};
 use holodrive::segments::SceneOptions;
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -15,7 +14,7 @@ use std::path::PathBuf;
 /// :param plate: the plate's .toml file: extent, pitch, reference wave, lamps.
 /// :param folder: where the plate is written.
 /// :param dry_run: computes nothing and says what it would take.
-/// :param shard: part of the tiles, such as "3/8".
+/// :param shard: part of the tiles, such as "0/8" for the first of eight.
 /// :param progress: see :func:`hologram`.
 /// :return: a dict: of a dry run the plan (size, extent, tiles, segments, points, seconds, warnings …), else what was done.
 #[pyfunction]
