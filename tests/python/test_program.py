@@ -34,6 +34,17 @@ def test_the_package_brings_the_program(tmp_path: Path) -> None:
     assert help_of.returncode == 0 and "Usage: holodrive encode" in help_of.stdout
 
 
+def test_the_wheel_says_what_it_is_and_needs() -> None:
+    from importlib.metadata import metadata, requires, version
+
+    assert version("holodrive") == hd.__version__
+    crate = (ROOT / "Cargo.toml").read_text()
+    assert f'\nversion = "{hd.__version__}"\n' in crate, "the package has another version than the library"
+    assert metadata("holodrive")["Requires-Python"] == ">=3.9"
+    needed = requires("holodrive") or []
+    assert [one for one in needed if "extra" not in one] == ["numpy>=1.24"]
+
+
 def test_the_program_refuses_in_one_line_with_its_exit_code(tmp_path: Path) -> None:
     said = holodrive("encode", "none.npy", "-o", "out.png", cwd=tmp_path)
     assert said.returncode == 2 and len(said.stderr.splitlines()) == 1 and "none.npy" in said.stderr
