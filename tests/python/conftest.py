@@ -35,7 +35,9 @@ def room() -> hd.Scene:
     return hd.Scene.load(ROOT / "scenes" / "cornell.gltf")
 
 
-def sphere(panel: hd.Panel, place: "tuple[float, float, float]", wavelength: float) -> "np.ndarray[tuple[int, int], np.dtype[np.complex128]]":
+def sphere(
+    panel: hd.Panel, place: "tuple[float, float, float]", wavelength: float
+) -> "np.ndarray[tuple[int, int], np.dtype[np.complex128]]":
     """The wave of a point: exp(+ikr)/r from behind the panel, exp(-ikr)/r towards a point before it."""
     x, y = np.meshgrid(panel.x, panel.y)
     r = np.sqrt((x - place[0]) ** 2 + (y - place[1]) ** 2 + place[2] ** 2)

@@ -33,7 +33,9 @@ def test_a_length_without_a_unit_is_refused(text: str) -> None:
     assert isinstance(caught.value, hd.Error)
 
 
-@pytest.mark.parametrize("text, metres", [("8um", 8e-6), ("632.8nm", 632.8e-9), ("0.25m", 0.25), ("-120mm", -0.12), (0.5, 0.5), (np.float32(2), 2)])
+@pytest.mark.parametrize(
+    "text, metres", [("8um", 8e-6), ("632.8nm", 632.8e-9), ("0.25m", 0.25), ("-120mm", -0.12), (0.5, 0.5), (np.float32(2), 2)]
+)
 def test_lengths_are_metres_or_text(text: Any, metres: float) -> None:
     assert hd.length(text) == pytest.approx(metres, rel=1e-12)
 

@@ -57,7 +57,10 @@ def test_what_the_program_computes_is_what_python_computes(panel: hd.Panel, tmp_
     profile = (ROOT / "calib" / "generic.toml").read_text()
     profile = profile.replace("width = 1920", "width = 64").replace("height = 1080", "height = 48")
     (tmp_path / "small.toml").write_text(profile)
-    for arguments in [("compute", "points.ply", "-o", "field.npy"), ("encode", "field.npy", "--encoding", "double-phase", "-o", "frame.png")]:
+    for arguments in [
+        ("compute", "points.ply", "-o", "field.npy"),
+        ("encode", "field.npy", "--encoding", "double-phase", "-o", "frame.png"),
+    ]:
         said = holodrive(*arguments, "--panel", "small.toml", "--wavelength", "532nm", cwd=tmp_path)
         assert said.returncode == 0, said.stderr
     small = hd.Panel(tmp_path / "small.toml", wavelength="532nm")
@@ -103,8 +106,30 @@ def test_calls_take_no_longer_than_the_program(tmp_path: Path) -> None:
             best.append((made - begin, time.perf_counter() - made))
         said = []
         for _ in range(2):
-            computed = holodrive("compute", "points.ply", "--engine", "planes", "--wavelength", "532nm", "-o", "field.npy", "--json", cwd=tmp_path)
-            encoded = holodrive("encode", "field.npy", "--encoding", "double-phase", "--wavelength", "532nm", "-o", "frame.png", "--json", cwd=tmp_path)
+            computed = holodrive(
+                "compute",
+                "points.ply",
+                "--engine",
+                "planes",
+                "--wavelength",
+                "532nm",
+                "-o",
+                "field.npy",
+                "--json",
+                cwd=tmp_path,
+            )
+            encoded = holodrive(
+                "encode",
+                "field.npy",
+                "--encoding",
+                "double-phase",
+                "--wavelength",
+                "532nm",
+                "-o",
+                "frame.png",
+                "--json",
+                cwd=tmp_path,
+            )
             assert computed.returncode == encoded.returncode == 0, computed.stderr + encoded.stderr
             said.append((json.loads(computed.stdout), json.loads(encoded.stdout)))
         calls += [min(times) for times in zip(*best)]
@@ -209,5 +234,7 @@ def test_the_client_is_the_same_file_that_the_program_writes(tmp_path: Path) -> 
     assert (ROOT / "src" / "serve" / "holodrive.py").read_bytes() == written
     # Alone it needs nothing of the package.
     code = "import holodrive; print(holodrive.__file__, holodrive.Error.__mro__[1].__name__)"
-    alone = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(tmp_path)})
+    alone = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(tmp_path)}
+    )
     assert alone.stdout.split() == [str(tmp_path / "holodrive.py"), "RuntimeError"], alone.stderr

@@ -170,12 +170,58 @@ def test_views_of_ones_own_are_a_light_field(wide: hd.Panel) -> None:
     wall = np.zeros((40, 60), np.float32)
     wall[10:30, 15:45] = 0.8
     light = hd.LightField(
-        np.broadcast_to(wall, (10, 10, 40, 60)), eye=(0, 0, 0.6), spacing="0.5mm", window=("3.84mm", "2.16mm"), depth=(-0.01, -0.01)
+        np.broadcast_to(wall, (10, 10, 40, 60)),
+        eye=(0, 0, 0.6),
+        spacing="0.5mm",
+        window=("3.84mm", "2.16mm"),
+        depth=(-0.01, -0.01),
     )
     assert np.allclose(light.view(0, 9), wall, atol=1e-4)
     frame = hd.encode(light, wide, iterations=30)
     seen = np.asarray(hd.reconstruct(frame, -0.01, eye=(0, 0, 0.6), pupil="4mm", size=(60, 40)))
     assert seen[12:28, 18:42].mean() > 20 * seen[:6].mean()
+
+
+def test_views_in_colour_have_three_channels(wide: hd.Panel) -> None:
+    views = np.zeros((9, 9, 20, 30, 3), np.float32)
+    views[..., 1] = 0.5
+    light = hd.LightField(views, eye=(0, 0, 0.6), spacing="0.5mm", window=("3mm", "2mm"), depth=(-0.01, -0.02))
+    assert light.channels == 3 and "in colour" in repr(light)
+    assert not light.view(channel=0).any() and np.allclose(light.view(channel=1), 0.5, atol=1e-4)
+    with pytest.raises(hd.ParameterError, match="3: there are 3"):
+        light.codes(3)
+    with pytest.raises(hd.ParameterError, match="row 9"):
+        light.view(9, 0)
+
+
+def test_views_on_the_panels_lattice_are_taken_as_they_are(light: hd.LightField, wide: hd.Panel) -> None:
+    assert np.array_equal(hd.light_field(light, wide).codes(), light.codes())
+    with pytest.raises(hd.OutOfRangeError, match="is not where the views stand"):
+        hd.light_field(light, wide, eye=(0, 0, 0.5))
+
+
+def test_a_light_field_of_points_shows_them_where_they_stand(wide: hd.Panel) -> None:
+    # Seen from the eye, a point 0.1 m behind the panel stands at 6/7 of its place on the panel.
+    light = hd.light_field(hd.Points([[7e-4, -3.5e-4, -0.1]]), wide)
+    row, column = np.unravel_index(int(light.view().argmax()), light.shape[2:])
+    width, height = light.window
+    x, y = ((column + 0.5) / light.shape[3] - 0.5) * width, (0.5 - (row + 0.5) / light.shape[2]) * height
+    assert abs(x - 6e-4) < 1e-4 and abs(y + 3e-4) < 1e-4
+
+
+def test_a_scene_and_points_are_encoded_for_an_eye_at_once(
+    room: hd.Scene, points: hd.Points, light: hd.LightField, wide: hd.Panel
+) -> None:
+    by_points = hd.encode(points, wide, iterations=3)
+    assert np.array_equal(by_points.levels, hd.encode(light, wide, iterations=3).levels)
+    assert hd.encode(room, wide, iterations=1).metadata["encoding"]["method"] == "view"
+
+
+def test_all_of_the_light_is_a_pupil(points: hd.Points, wide: hd.Panel) -> None:
+    light = hd.light_field(points, wide, pupil="all")
+    frame = hd.encode(light, wide, pupil="all", iterations=3)
+    figures = hd.judge(frame, light, pupil="all", looks=2)
+    assert figures["efficiency"] > 0.9
 
 
 @pytest.mark.parametrize(
@@ -221,7 +267,9 @@ def test_faults_of_the_bench_cost_light(panel: hd.Panel) -> None:
 
 
 def test_a_plate_is_planned(tmp_path: Path) -> None:
-    plan = hd.print_plate(ROOT / "scenes" / "cornell.gltf", ROOT / "calib" / "plate-small.toml", tmp_path / "plate", dry_run=True)
+    plan = hd.print_plate(
+        ROOT / "scenes" / "cornell.gltf", ROOT / "calib" / "plate-small.toml", tmp_path / "plate", dry_run=True
+    )
     assert plan["size"][0] > 100 and plan["seconds"] > 0 and not (tmp_path / "plate").exists()
 
 

@@ -85,7 +85,11 @@ class Served:
         :param timeout: longest wait for its end [s]; then it is killed.
         """
         if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
+            if sys.platform == "win32":
+                # Ctrl-C there goes to all processes of a console.
+                self.process.terminate()
+            else:
+                self.process.send_signal(signal.SIGINT)
         try:
             self.process.wait(timeout)
         except subprocess.TimeoutExpired:

@@ -1,6 +1,6 @@
 //! Fields, phases and light fields to frames.
 
-use crate::errors::refused;
+use crate::errors::{Raise, refused};
 use crate::field::Given;
 use crate::frame::Frame;
 use crate::light_field::{Content, Looking, PupilGiven, views};
@@ -176,10 +176,7 @@ pub(crate) fn encode<'py>(
         }
         let sub_frames = match subframes {
             None => None,
-            Some(count) => {
-                use crate::errors::Raise;
-                Some(SubFrames::new(count, Multiplexing::Phases, seed).raise(py)?)
-            }
+            Some(count) => Some(SubFrames::new(count, Multiplexing::Phases, seed).raise(py)?),
         };
         let looking = Looking { eye, pupil, eye_box };
         let mut frames = for_an_eye(py, &content, setup, looking, view, sub_frames, progress)?;
