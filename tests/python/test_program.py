@@ -77,7 +77,7 @@ def test_ctrl_c_ends_the_program_at_once(tmp_path: Path) -> None:
     hd.Points(places).write(tmp_path / "many.ply")
     command = [*PROGRAM, "compute", "many.ply", "--engine", "direct", "-o", "field.npy"]
     process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
-    time.sleep(2.0)
+    time.sleep(2.5)
     begin = time.monotonic()
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=20)
@@ -90,7 +90,7 @@ def test_calls_take_no_longer_than_the_program(tmp_path: Path) -> None:
     """Ten calls against the steps that the program itself times, which leave its start and its files out."""
     panel = hd.Panel("generic", wavelength="532nm")
     random = np.random.default_rng(7)
-    calls, steps = [], []
+    calls, steps, own = [], [], []
     for index in range(5):
         count = 20_000 + 5_000 * index
         places = np.c_[random.uniform(-4e-3, 4e-3, (count, 2)), random.uniform(-0.25, -0.2, count)]
@@ -102,42 +102,27 @@ def test_calls_take_no_longer_than_the_program(tmp_path: Path) -> None:
             begin = time.perf_counter()
             field = hd.hologram(points, panel, engine="planes")
             made = time.perf_counter()
+            assert field.report is not None
+            report = field.report
             hd.encode(field, panel, encoding="double-phase")
             best.append((made - begin, time.perf_counter() - made))
         said = []
         for _ in range(2):
-            computed = holodrive(
-                "compute",
-                "points.ply",
-                "--engine",
-                "planes",
-                "--wavelength",
-                "532nm",
-                "-o",
-                "field.npy",
-                "--json",
-                cwd=tmp_path,
-            )
-            encoded = holodrive(
-                "encode",
-                "field.npy",
-                "--encoding",
-                "double-phase",
-                "--wavelength",
-                "532nm",
-                "-o",
-                "frame.png",
-                "--json",
-                cwd=tmp_path,
-            )
+            laser = "--wavelength 532nm --json"
+            computed = holodrive(*f"compute points.ply --engine planes -o field.npy {laser}".split(), cwd=tmp_path)
+            encoded = holodrive(*f"encode field.npy --encoding double-phase -o frame.png {laser}".split(), cwd=tmp_path)
             assert computed.returncode == encoded.returncode == 0, computed.stderr + encoded.stderr
             said.append((json.loads(computed.stdout), json.loads(encoded.stdout)))
         calls += [min(times) for times in zip(*best)]
-        steps += [min(report["field_seconds"] for report, _ in said), min(report["encode_seconds"] for _, report in said)]
+        steps += [min(told["field_seconds"] for told, _ in said), min(told["encode_seconds"] for _, told in said)]
+        own.append((best[-1][0], report["seconds"]))
     ours, theirs = sum(calls), sum(steps)
+    spent, inside = (sum(times) for times in zip(*own))
+    print(f"of {spent:.2f} s of the last calls the library took {inside:.2f} s: {100 * (spent / inside - 1):+.1f} %")
     print(f"{len(calls)} calls in {ours:.2f} s, the program's steps {theirs:.2f} s: {100 * (ours / theirs - 1):+.1f} %")
-    # Both are timed on a machine that does other things, too: an overhead that matters is far above this.
-    assert ours < 1.15 * theirs
+    assert spent < 1.05 * inside
+    # These are timed one after the other on a machine that does other things, too.
+    assert ours < 1.25 * theirs
 
 
 @pytest.fixture
