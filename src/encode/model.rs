@@ -2,7 +2,7 @@
 //! crosstalk and the wave that falls on it.
 
 use crate::error::{Error, Result};
-use crate::field::{Complex32, Complex64, Grid, phasor, zeroed};
+use crate::field::{Complex32, Complex64, Grid, angle, phasor, zeroed};
 use crate::panel::simulated::{blurred, illuminate};
 use crate::panel::{DriveCurve, Illumination, Modulation, PanelProfile};
 use rayon::prelude::*;
@@ -153,12 +153,12 @@ impl PanelModel {
             Some(wave) => light * wave[i].conj() - self.dead * wave[i].norm_sqr(),
         };
         if self.crosstalk == 0.0 {
-            return wished.arg();
+            return angle(wished);
         }
         let shown = self.incident.as_ref().map_or(modulated, |wave| modulated * wave[i].conj());
         let turn = wished * shown.conj();
         // Where the panel has no more range the wish must not run away.
-        let moved = before + turn.arg();
+        let moved = before + angle(turn);
         self.range.map_or(moved, |range| range.nearest(moved))
     }
 

@@ -16,7 +16,7 @@ pub use fft::{Fft2, FftNum};
 pub use grid::Grid;
 pub(crate) use memory::zeroed;
 pub use num_complex::{Complex, Complex32, Complex64};
-pub(crate) use phasor::phasor;
+pub(crate) use phasor::{angle, phasor};
 
 use crate::error::{Error, Result};
 

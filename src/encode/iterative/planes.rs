@@ -5,11 +5,12 @@
 //! whole transforms.
 
 use crate::error::{Error, Result};
-use crate::field::{Complex32, Fft2, Grid};
+use crate::field::{Complex32, Fft2, Grid, zeroed};
 use crate::progress::Progress;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use std::sync::Mutex;
 
 /// How the borders of the panel are treated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,6 +33,8 @@ pub(super) struct Planes {
     transform: Fft2<f32>,
     /// Transfer functions for frequencies of both signs, column by column: (width/2 + 1) columns of height/2 + 1.
     transfers: Vec<Vec<Complex32>>,
+    /// Memory of transforms, kept from step to step: new pages cost more than the arithmetic.
+    kept: Mutex<Vec<Vec<Complex32>>>,
 }
 
 impl Planes {
@@ -80,7 +83,7 @@ impl Planes {
             .collect();
         progress.check()?;
         let transform = Fft2::new(padded.width, padded.height);
-        Ok(Self { grid, width: padded.width, height: padded.height, transform, transfers })
+        Ok(Self { grid, width: padded.width, height: padded.height, transform, transfers, kept: Mutex::default() })
     }
 
     /// Number of planes.
@@ -108,11 +111,13 @@ impl Planes {
         progress.check()?;
         let (width, height, rows) = (self.width, self.height, self.height / 2 + 1);
         let transfer = &self.transfers[k];
-        let mut samples = vec![Complex32::new(0.0, 0.0); width * height];
-        samples
-            .par_chunks_mut(width)
-            .zip(field.par_chunks(self.grid.width))
-            .for_each(|(row, source)| row[..source.len()].copy_from_slice(source));
+        let kept = self.kept.lock().ok().and_then(|mut kept| kept.pop());
+        let mut samples = kept.unwrap_or_else(|| vec![Complex32::default(); width * height]);
+        // Rows below the panel's count as dark, whatever is in them.
+        samples.par_chunks_mut(width).zip(field.par_chunks(self.grid.width)).for_each(|(row, source)| {
+            row[..source.len()].copy_from_slice(source);
+            row[source.len()..].fill(Complex32::default());
+        });
         let multiply = |kx: usize, column: &mut [Complex32]| {
             let from = &transfer[kx.min(width - kx) * rows..][..rows];
             let (lower, upper) = column.split_at_mut(rows);
@@ -126,9 +131,11 @@ impl Planes {
         if width == self.grid.width {
             return Ok(samples);
         }
-        let mut out = Vec::with_capacity(self.grid.len());
-        for row in samples.chunks(width).take(self.grid.height) {
-            out.extend_from_slice(&row[..self.grid.width]);
+        let mut out = zeroed(self.grid.len());
+        let rows = out.par_chunks_mut(self.grid.width).zip(samples.par_chunks(width));
+        rows.for_each(|(out, row)| out.copy_from_slice(&row[..out.len()]));
+        if let Ok(mut kept) = self.kept.lock() {
+            kept.push(samples);
         }
         Ok(out)
     }
