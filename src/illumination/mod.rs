@@ -138,7 +138,7 @@ impl Default for IlluminationSettings {
         Self {
             form_factor: FormFactor::Lambert,
             residual: 1e-4,
-            indirect_rays: 256,
+            indirect_rays: 324,
             shadow_rays: 16,
             penumbra_rays: 64,
             longest_element: 1.0 / 16.0,

@@ -312,7 +312,7 @@ fn a_closed_body_of_many_triangles_is_lit_on_the_side_where_there_is_light() {
 #[test]
 fn a_spot_of_sun_lights_what_is_above_it() {
     // Straight light on a white square of 0.6 m in the dark, and over it, beside the beam, a ceiling that gets light from there
-    // alone: E/π = B·F with the square's form factor, some of a probe's 256 cells.
+    // alone: E/π = B·F with the square's form factor, some of a probe's 324 cells.
     let mut room = Room::default();
     let (white, grey) = (Material::diffuse(Vec3::ONE), Material::diffuse(Vec3::splat(0.02)));
     let (white, grey) = (room.material(white), room.material(grey));
