@@ -18,6 +18,7 @@ mod live;
 mod load;
 mod monitors;
 mod output;
+mod panels;
 mod pictures;
 mod print;
 mod reconstruct;
@@ -91,6 +92,7 @@ pub fn main(arguments: &[OsString]) -> u8 {
         Command::Calibrate { what } => calibrate::calibrate(&what),
         Command::Print(args) => print::print(&args, json),
         Command::Serve(args) => serve::serve(&args, json),
+        Command::Panels(args) => panels::panels(&args),
         Command::Monitors(args) => monitors::monitors(&args),
         Command::Doctor(args) => monitors::doctor(&args),
     };

@@ -10,12 +10,9 @@ pub(super) use real::{doctor, monitors};
 #[cfg(feature = "display")]
 mod real {
     use super::{DoctorArgs, MonitorsArgs, Report, Result};
+    use crate::Error;
     use crate::display::{self, Display, Monitor, MonitorChoice};
     use crate::panel::PanelProfile;
-    use crate::{Error, files};
-    use serde::Serialize;
-    use serde_json::Value;
-    use std::path::Path;
 
     /// Lists the monitors.
     pub(crate) fn monitors(args: &MonitorsArgs) -> Result<Report> {
@@ -23,7 +20,7 @@ mod real {
         let profile = args.panel.as_deref().map(PanelProfile::find).transpose()?;
         let monitors = Display::connect()?.monitors()?;
         let lines = monitors.iter().map(|monitor| format!("{monitor}{}", fitting_profiles(monitor, profile.as_ref())));
-        list(&mut report, "monitors", lines, &monitors, args.output.as_deref())?;
+        report.list("monitors", lines, &monitors, args.output.as_deref())?;
         Ok(report)
     }
 
@@ -48,7 +45,7 @@ mod real {
             let place = finding.monitor.as_deref().unwrap_or("desktop");
             format!("{place:10} {:14} {:?}: {}", finding.subject, finding.severity, finding.what)
         });
-        list(&mut report, "findings", lines, &findings, args.output.as_deref())?;
+        report.list("findings", lines, &findings, args.output.as_deref())?;
         if let Some(path) = &args.card {
             let monitors = display.monitors()?;
             let first =
@@ -59,21 +56,6 @@ mod real {
             report.add("card", path.display().to_string(), line);
         }
         Ok(report)
-    }
-
-    /// Reports a list, a line for each of its entries, and writes it to a file where that is asked for.
-    fn list<T: Serialize>(
-        report: &mut Report,
-        key: &str,
-        lines: impl Iterator<Item = String>,
-        entries: &[T],
-        path: Option<&Path>,
-    ) -> Result<()> {
-        lines.for_each(|line| report.add("", Value::Null, line));
-        report.add_serialised(key, &entries, "");
-        let Some(path) = path else { return Ok(()) };
-        let text = serde_json::to_string_pretty(entries).map_err(|e| Error::unsupported(e.to_string()))?;
-        files::write_bytes(path, text.as_bytes())
     }
 }
 

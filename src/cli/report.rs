@@ -51,6 +51,20 @@ impl Report {
     pub(crate) fn add_serialised(&mut self, key: &str, value: &impl Serialize, line: impl Into<String>) {
         self.add(key, value, line);
     }
+    /// Adds a list, a line for each of its entries, and writes it to a file where that is asked for.
+    pub(crate) fn list<T: Serialize>(
+        &mut self,
+        key: &str,
+        lines: impl Iterator<Item = String>,
+        entries: &[T],
+        path: Option<&Path>,
+    ) -> Result<()> {
+        lines.for_each(|line| self.line(line));
+        self.add_serialised(key, &entries, "");
+        let Some(path) = path else { return Ok(()) };
+        let text = serde_json::to_string_pretty(entries).map_err(|e| Error::unsupported(e.to_string()))?;
+        files::write_bytes(path, text.as_bytes())
+    }
     /// Adds what was written, and where.
     pub(crate) fn output(&mut self, what: &str, path: &Path) {
         self.file("output", what, path);

@@ -8,6 +8,7 @@ mod groups;
 mod hologram;
 mod monitors;
 mod panel;
+mod panels;
 mod parse;
 mod placement;
 mod print;
@@ -27,6 +28,7 @@ pub(crate) use groups::{Group, unused};
 pub(crate) use hologram::HologramArgs;
 pub(crate) use monitors::{DoctorArgs, MonitorsArgs};
 pub(crate) use panel::{ColorArgs, PanelArgs};
+pub(crate) use panels::PanelsArgs;
 #[cfg(feature = "display")]
 pub(crate) use parse::Ahead;
 #[cfg(feature = "display")]
@@ -167,6 +169,9 @@ pub(crate) enum Command {
         after_long_help = "Examples:\n  holodrive serve --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive serve --panel generic --monitor none --slmsuite 0 --json\n  holodrive serve --panel mine.toml --monitor HDMI-1 --local --on-client-gone idle --idle flat.png\n  holodrive serve --write-python holodrive.py"
     )]
     Serve(ServeArgs),
+    /// List the built-in panel profiles, and which of their figures nobody has checked.
+    #[command(after_long_help = "Examples:\n  holodrive panels\n  holodrive panels --json")]
+    Panels(PanelsArgs),
     /// List the monitors, and which panel profile fits each.
     #[command(after_long_help = "Example:\n  holodrive monitors --panel holoeye-pluto-2.1")]
     Monitors(MonitorsArgs),

@@ -1,0 +1,11 @@
+//! Flags of `panels`.
+
+use clap::Args;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub(crate) struct PanelsArgs {
+    /// Also write the list to this file, as JSON.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+}
