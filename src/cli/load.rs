@@ -70,9 +70,12 @@ pub(super) fn input(path: &Path) -> Result<Input> {
         _ => {
             let what = "not a kind of file that is read here: .gltf, .glb, .obj, .stl; .ply, .xyz, .csv, .pcd, .las; .npy, .npz, .mat, .h5; \
                         .png, .bmp, .tif, .jpg; or rgb.png+depth.png";
-            return Err(Error::input(path, what));
+            return Err(Error::input(path, gltf::not_embedded(path).unwrap_or_else(|| what.into())));
         }
     };
+    if gltf::embedded(path).is_some() {
+        return Ok(found);
+    }
     // Found out before an output folder is made.
     std::fs::File::open(&file).map_err(Error::io(&file))?;
     Ok(found)

@@ -9,7 +9,7 @@ use super::shard::Shard;
 use crate::error::{Error, Result};
 use crate::hologram::InstructionSet;
 use crate::progress::Progress;
-use crate::scene::gltf::is_scene;
+use crate::scene::gltf::{is_scene, not_embedded};
 use crate::segments::{Object, ObjectWave, SceneOptions, is_cloud};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -64,10 +64,9 @@ impl PlateJob {
     pub fn new(asked: PrintSettings, progress: &Progress) -> Result<Self> {
         let PrintSettings { plate, input, mut options, folder, shard, dry_run } = asked;
         if !is_cloud(&input) && !is_scene(&input) {
-            return Err(Error::input(
-                input,
-                "is no scene (.gltf, .glb, .obj, .stl) or point cloud (.ply, .xyz, .pcd, .las)",
-            ));
+            let what = "is no scene (.gltf, .glb, .obj, .stl) or point cloud (.ply, .xyz, .pcd, .las)";
+            let what = not_embedded(&input).unwrap_or_else(|| what.into());
+            return Err(Error::input(input, what));
         }
         let settings = Settings::new(&plate, &input, &options)?;
         let manifest = if dry_run { None } else { folder::look(&folder, &settings)? };

@@ -227,7 +227,9 @@ fn inputs(path: &Path, around: Option<&Path>) -> Result<Vec<Input>> {
         }
     };
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().to_string();
-    let mut found = vec![Input { name: name(path), sha256: hash(path)? }];
+    // What is beside an embedded scene changes with the program only, as the scene does.
+    let own = gltf::embedded(path).map(sha256);
+    let mut found = vec![Input { name: name(path), sha256: own.map_or_else(|| hash(path), Ok)? }];
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
         let text = fs::read(path).map_err(Error::io(path))?;
         // What is no JSON is refused, with better words, by whoever reads the scene.

@@ -2,6 +2,7 @@
 
 use super::Choice;
 use super::converted;
+use super::embedded;
 use super::packed;
 use super::resources::{self, MAX_FILE_BYTES, Source};
 use super::rewritten::rewrite;
@@ -49,6 +50,8 @@ pub(super) struct Document {
     pub(super) root: json::Root,
     /// Whether URIs may point outside of the file's folder.
     pub(super) allow_outside: bool,
+    /// Whether it came with the library.
+    pub(super) is_embedded: bool,
     /// Content of each buffer, at least as long as the file says.
     buffers: Vec<Vec<u8>>,
     /// URIs of further files that it was read from, images and buffers apart.
@@ -58,7 +61,14 @@ pub(super) struct Document {
 impl Document {
     /// Reads the file and its buffers, and checks version and extensions.
     pub(super) fn open(path: &Path, allow_outside: bool, warnings: &mut Vec<Warning>) -> Result<Self> {
-        let bytes = resources::read_file(path, MAX_FILE_BYTES).map_err(|why| Error::input(path, why))?;
+        let own = embedded::embedded(path);
+        let bytes = match own {
+            Some(own) => Cow::Borrowed(own),
+            None => Cow::Owned(
+                resources::read_file(path, MAX_FILE_BYTES)
+                    .map_err(|why| Error::input(path, embedded::not_embedded(path).unwrap_or(why)))?,
+            ),
+        };
         let source = Source { scene: path, allow_outside };
         let told = converted::convert(source, &bytes, warnings).map_err(|why| Error::input(path, why))?;
         let mut beside = Vec::new();
@@ -99,7 +109,7 @@ impl Document {
             buffers.push(content);
         }
         packed::unpack(path, &mut root, &mut buffers)?;
-        Ok(Self { path: path.to_path_buf(), root, allow_outside, buffers, beside })
+        Ok(Self { path: path.to_path_buf(), root, allow_outside, is_embedded: own.is_some(), buffers, beside })
     }
 
     /// An [`Error::Input`] for this file.

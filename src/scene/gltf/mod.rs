@@ -37,6 +37,7 @@ mod animation;
 mod cameras;
 mod converted;
 mod document;
+mod embedded;
 mod image_light;
 mod images;
 mod instances;
@@ -54,6 +55,7 @@ mod vertices;
 
 pub use converted::is_scene;
 pub use document::UNDERSTOOD_EXTENSIONS;
+pub use embedded::{embedded, embedded_names, not_embedded};
 pub use images::{MAX_TEXELS, MAX_TEXTURE_SIDE};
 pub use meshes::{MAX_COORDINATE, MAX_TRIANGLES};
 pub use resources::MAX_FILE_BYTES;
@@ -128,7 +130,7 @@ pub struct Loaded {
     pub warnings: Vec<Warning>,
 }
 
-/// Loads the glTF file at `path`, flattened into world-space triangles.
+/// Loads the glTF file at `path`, or the scene that comes with the library by that name ([`embedded`]), flattened into world-space triangles.
 ///
 /// A file that lights nothing (no emission, no punctual light, not everything unlit) is lit by a directional light of
 /// irradiance 2.2 W/m² from the viewer's upper left and by a point light at the first camera that gives 0.8 W/m² at the
@@ -249,8 +251,11 @@ impl File {
         self.document.root.nodes.iter().any(|node| node.camera.is_some())
     }
 
-    /// The files that it is read from: itself, and buffers, images and materials beside it.
+    /// The files that it is read from: itself, and buffers, images and materials beside it; none of an embedded scene.
     pub fn files(&self) -> Vec<PathBuf> {
+        if self.document.is_embedded {
+            return Vec::new();
+        }
         let root = &self.document.root;
         let buffers = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
         let images = root.images.iter().filter_map(|image| image.uri.as_deref());

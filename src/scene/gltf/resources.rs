@@ -1,5 +1,6 @@
 //! Bytes from where URIs point: files beside the scene, and data URIs.
 
+use super::embedded;
 use base64::Engine;
 use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
@@ -50,6 +51,9 @@ pub(super) struct Source<'a> {
 pub(super) fn read_uri(source: Source, uri: &str, limit: u64) -> Result<Vec<u8>, String> {
     if let Some(data) = uri.strip_prefix("data:") {
         return decode_data_uri(data);
+    }
+    if let Some(own) = embedded::beside(source.scene, uri) {
+        return Ok(own.to_vec());
     }
     let path = path_of(source.scene, uri)?;
     if !source.allow_outside {

@@ -25,13 +25,13 @@ pub(super) fn convert(source: Source, bytes: &[u8], warnings: &mut Vec<Warning>)
     }
 }
 
-/// Whether a file is a scene: STL, or glTF and OBJ with surfaces (without, they are clouds).
+/// Whether a file is a scene: STL, or glTF and OBJ with surfaces (without, they are clouds); and an embedded scene's name is one.
 pub fn is_scene(path: &Path) -> bool {
     match ending(path).as_str() {
         "gltf" | "glb" => !super::has_only_points(path),
         "stl" => true,
         "obj" => obj::has_faces(path),
-        _ => false,
+        _ => super::embedded(path).is_some(),
     }
 }
 
