@@ -372,6 +372,7 @@ fn help_is_short_or_has_examples_and_what_was_meant_is_told() {
         "bench iterations",
         "serve",
         "panels",
+        "manual",
         "monitors",
         "doctor",
     ] {

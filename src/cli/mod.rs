@@ -16,6 +16,7 @@ mod light;
 #[cfg(feature = "display")]
 mod live;
 mod load;
+mod manual;
 mod monitors;
 mod output;
 mod panels;
@@ -93,6 +94,7 @@ pub fn main(arguments: &[OsString]) -> u8 {
         Command::Print(args) => print::print(&args, json),
         Command::Serve(args) => serve::serve(&args, json),
         Command::Panels(args) => panels::panels(&args),
+        Command::Manual(args) => manual::manual(&args),
         Command::Monitors(args) => monitors::monitors(&args),
         Command::Doctor(args) => monitors::doctor(&args),
     };

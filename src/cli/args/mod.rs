@@ -6,6 +6,7 @@ mod encoding;
 mod field;
 mod groups;
 mod hologram;
+mod manual;
 mod monitors;
 mod panel;
 mod panels;
@@ -26,6 +27,7 @@ pub(crate) use encoding::EncodingArgs;
 pub(crate) use field::FieldArgs;
 pub(crate) use groups::{Group, unused};
 pub(crate) use hologram::HologramArgs;
+pub(crate) use manual::ManualArgs;
 pub(crate) use monitors::{DoctorArgs, MonitorsArgs};
 pub(crate) use panel::{ColorArgs, PanelArgs};
 pub(crate) use panels::PanelsArgs;
@@ -43,6 +45,7 @@ pub(crate) use steps::{ComputeArgs, EncodeArgs, PointsArgs, PropagateArgs, Recon
 pub(crate) use viewer::ViewerArgs;
 pub(crate) use views::ViewsArgs;
 
+use crate::scene::gltf::embedded_names;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 
@@ -82,6 +85,12 @@ pub(crate) fn command(arguments: &[OsString]) -> clap::Command {
     })
 }
 
+/// The scenes that need no file; beneath the long help of each command that lights one.
+fn scenes() -> String {
+    let names: Vec<_> = embedded_names().collect();
+    format!("Built-in scenes, by name where no file is called so: {}.", names.join(", "))
+}
+
 fn dressed(command: clap::Command, short: bool) -> clap::Command {
     let depths = ["near", "distance", "depths", "focus"];
     let deep = command.get_arguments().any(|flag| depths.contains(&flag.get_id().as_str()));
@@ -89,9 +98,14 @@ fn dressed(command: clap::Command, short: bool) -> clap::Command {
         true => flag.hide_possible_values(short),
         false => flag,
     });
+    let lit = command.get_arguments().any(|flag| flag.get_id() == "environment");
     let command = match command.get_after_long_help().map(ToString::to_string) {
-        Some(examples) if deep => command.after_long_help(format!("{DEPTHS}\n\n{examples}")),
-        _ => command,
+        Some(examples) => {
+            let depths = if deep { format!("{DEPTHS}\n\n") } else { String::new() };
+            let scenes = if lit { format!("{}\n\n", scenes()) } else { String::new() };
+            command.after_long_help(format!("{depths}{scenes}{examples}"))
+        }
+        None => command,
     };
     command.mut_subcommands(|command| dressed(command, short))
 }
@@ -101,14 +115,14 @@ fn dressed(command: clap::Command, short: bool) -> clap::Command {
 pub(crate) enum Command {
     /// Light a scene and trace it into point sources.
     #[command(
-        after_long_help = "Examples:\n  holodrive points scenes/cornell.gltf -o points.ply\n  holodrive points room.glb -o world.ply --frame world --picture traced.npy --rays 800x600\n  holodrive points room.glb --points 100000 -o points.ply"
+        after_long_help = "Examples:\n  holodrive points cornell -o points.ply\n  holodrive points room.glb -o world.ply --frame world --picture traced.npy --rays 800x600\n  holodrive points room.glb --points 100000 -o points.ply"
     )]
     Points(PointsArgs),
     /// Make a light field: what an eye anywhere in an eye box sees of a scene, point cloud, or picture with depth.
     ///
     /// Pinhole views at most 0.5 mm apart over the box and the pupil. `show` and `encode --encoding view` take it.
     #[command(
-        after_long_help = "Examples:\n  holodrive views scenes/cornell.gltf -o cornell.npz\n  holodrive views room.glb --eye-box 10mm -o room.npz\n  holodrive views points.ply -o views/"
+        after_long_help = "Examples:\n  holodrive views cornell -o cornell.npz\n  holodrive views room.glb --eye-box 10mm -o room.npz\n  holodrive views points.ply -o views/"
     )]
     Views(ViewsArgs),
     /// Compute the field of a scene, point cloud, or picture with depth on the panel.
@@ -135,7 +149,7 @@ pub(crate) enum Command {
     ///
     /// It begins with what the input is: scene, points, field or frame.
     #[command(
-        after_long_help = "Examples:\n  holodrive show scenes/cornell.gltf\n  holodrive show scenes/cornell.gltf --eye-box 10mm,2mm --subframes 3\n  holodrive show scenes/cornell.gltf --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive show frames/ --monitor HDMI-1 --fps 30 --loop\n  holodrive show walk.glb --fps 12\n  holodrive show room.glb --monitor HDMI-1 --live\n  ffmpeg -i levels.mkv -f rawvideo -pix_fmt gray - | holodrive show - --raw 1920x1080 --monitor HDMI-1 --fps 24"
+        after_long_help = "Examples:\n  holodrive show cornell\n  holodrive show cornell --eye-box 10mm,2mm --subframes 3\n  holodrive show cornell --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive show frames/ --monitor HDMI-1 --fps 30 --loop\n  holodrive show walk.glb --fps 12\n  holodrive show room.glb --monitor HDMI-1 --live\n  ffmpeg -i levels.mkv -f rawvideo -pix_fmt gray - | holodrive show - --raw 1920x1080 --monitor HDMI-1 --fps 24"
     )]
     Show(Box<ShowArgs>),
     /// Find a panel's curve and wavefront error: frames to show, and what the measured numbers say.
@@ -149,7 +163,7 @@ pub(crate) enum Command {
     },
     /// Compare what this program offers, on the simulated panel.
     #[command(
-        after_long_help = "Examples:\n  holodrive bench views --scene scenes/cornell.gltf\n  holodrive bench encodings\n  holodrive bench encodings --size 96x72 --iterations 20 --json"
+        after_long_help = "Examples:\n  holodrive bench views --scene cornell\n  holodrive bench encodings\n  holodrive bench encodings --size 96x72 --iterations 20 --json"
     )]
     Bench {
         /// What to compare.
@@ -158,7 +172,7 @@ pub(crate) enum Command {
     },
     /// Print a hologram: fringes of a plate of any size, tile by tile into a file.
     #[command(
-        after_long_help = "Examples:\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml --dry-run\n  holodrive print scenes/cornell.gltf --plate calib/plate-small.toml -o plate\n  holodrive print scenes/cornell.gltf --plate calib/plate-chrome-1um.toml -o plate --shard auto"
+        after_long_help = "Examples:\n  holodrive print cornell --plate calib/plate-chrome-1um.toml --dry-run\n  holodrive print cornell --plate calib/plate-small.toml -o plate\n  holodrive print cornell --plate calib/plate-chrome-1um.toml -o plate --shard auto"
     )]
     Print(PrintArgs),
     /// Keep a panel, and show on it what other programs send.
@@ -172,6 +186,13 @@ pub(crate) enum Command {
     /// List the built-in panel profiles, and which of their figures nobody has checked.
     #[command(after_long_help = "Examples:\n  holodrive panels\n  holodrive panels --json")]
     Panels(PanelsArgs),
+    /// Write man pages of all commands, and completions for bash, zsh, fish and PowerShell.
+    ///
+    /// Everything stands below the folder as it does below /usr/share: where that is ~/.local/share, man, bash and fish find it.
+    #[command(
+        after_long_help = "Examples:\n  holodrive manual ~/.local/share\n  holodrive manual debian/holodrive/usr/share"
+    )]
+    Manual(ManualArgs),
     /// List the monitors, and which panel profile fits each.
     #[command(after_long_help = "Example:\n  holodrive monitors --panel holoeye-pluto-2.1")]
     Monitors(MonitorsArgs),
