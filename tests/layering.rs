@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// Rooms in the order of the numbered list in the crate's documentation.
 fn rooms() -> Vec<String> {
@@ -115,6 +116,42 @@ fn one_file_names_each_outside_crate_that_the_house_confines() {
             }
         }
     }
+}
+
+#[test]
+fn the_package_has_every_file_that_the_sources_include() {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let listed = Command::new(cargo).args(["package", "--list", "--offline", "--allow-dirty"]).output().expect("cargo");
+    let told = String::from_utf8_lossy(&listed.stderr);
+    assert!(listed.status.success() && !told.contains("warning"), "{told}");
+    let listed = String::from_utf8(listed.stdout).expect("names").replace('\\', "/");
+    let packed: Vec<&str> = listed.lines().collect();
+    let mut files = Vec::new();
+    sources(Path::new("src"), &mut files);
+    let mut seen = 0;
+    for file in files {
+        let text = fs::read_to_string(&file).expect("source");
+        for call in ["include_str!(\"", "include_bytes!(\""] {
+            for (at, _) in text.match_indices(call) {
+                let named = text[at + call.len()..].split('"').next().expect("a name");
+                let mut path: Vec<&str> =
+                    file.parent().expect("folder").iter().filter_map(|part| part.to_str()).collect();
+                for part in named.split('/') {
+                    match part {
+                        ".." => drop(path.pop()),
+                        part => path.push(part),
+                    }
+                }
+                let path = path.join("/");
+                assert!(packed.contains(&path.as_str()), "{}: {path} is not in the package", file.display());
+                seen += 1;
+            }
+        }
+    }
+    // Panels and scenes.
+    assert!(seen >= 20, "only {seen} files were seen: the test reads the sources wrongly");
+    let size: u64 = packed.iter().filter_map(|path| fs::metadata(path).ok()).map(|file| file.len()).sum();
+    assert!(size < 10_000_000, "the package has {size} bytes");
 }
 
 /// The code of a file without its tests.
