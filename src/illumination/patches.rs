@@ -22,6 +22,8 @@ use std::f64::consts::PI;
 /// Where a patch's places get less than this part of the light of its brightest one, an edge of a shadow is about: more are looked
 /// at.
 const EVEN: f32 = 0.7;
+/// Fewest shadow rays of a place.
+const LEAST_SHADOW_RAYS: u32 = 4;
 
 /// Per sender: what it does to light and what it gets.
 pub(crate) struct Patches {
@@ -76,7 +78,8 @@ impl Patches {
                     // A share of the rays of a picture's point at each place: the mean over the patch is what counts.
                     let share = places.len() as u32;
                     let rays = ShadowRays {
-                        first: settings.shadow_rays.div_ceil(share),
+                        // One ray tells whether it arrives, not how much of the lamp does.
+                        first: settings.shadow_rays.div_ceil(share).max(LEAST_SHADOW_RAYS),
                         penumbra: 0,
                         clear: clear[sender.element as usize],
                     };
