@@ -51,9 +51,9 @@ impl Bar {
     }
 }
 
-/// How long a job may take to see that it is to stop, and to end once it has. What is written is written whole or taken away,
-/// so that nothing is lost by not waiting for a job that reads a large file or sorts its triangles.
-const DEAF: Duration = Duration::from_millis(40);
+/// How long a job may take to see that it is to stop, and to end once it has. Not much less: a window and a server take some
+/// hundredths of a second to end in good order.
+const DEAF: Duration = Duration::from_millis(500);
 const ENDING: Duration = Duration::from_secs(5);
 
 /// Ends the program where the job does not see that it is to stop: it waits for a file, or is in a long step.

@@ -130,7 +130,8 @@ pub struct Loaded {
     pub warnings: Vec<Warning>,
 }
 
-/// Loads the glTF file at `path`, or the scene that comes with the library by that name ([`embedded`]), flattened into world-space triangles.
+/// Loads the glTF file at `path`, or the scene that comes with the library by that name ([`embedded`]), flattened into
+/// world-space triangles.
 ///
 /// A file that lights nothing (no emission, no punctual light, not everything unlit) is lit by a directional light of
 /// irradiance 2.2 W/m² from the viewer's upper left and by a point light at the first camera that gives 0.8 W/m² at the
