@@ -200,6 +200,8 @@ pub struct IlluminationReport {
 
 /// Most gathering rays in all: probes beyond some tens of thousands lie so close that the noise of each counts less.
 const MOST_GATHERING_RAYS: usize = 4_000_000;
+/// The same with those that look again where brightness jumps.
+const MOST_RAYS_IN_ALL: usize = 6_000_000;
 /// Residual at which it is known well enough which patches are bright.
 const ROUGH_RESIDUAL: f64 = 1e-2;
 /// Distance within which vertices share gathering rays, over the shortest edge that is split.
@@ -295,7 +297,8 @@ impl Illumination {
         let leave = |irradiance: &[Vec3]| -> Vec<Vec3> {
             bounce(irradiance).iter().zip(&source).map(|(reflected, s)| *s + *reflected).collect()
         };
-        transport.refine(&leave(&first), MOST_GATHERING_RAYS, progress)?;
+        let left = MOST_RAYS_IN_ALL.saturating_sub(transport.rays() as usize);
+        transport.refine(&leave(&first), left, progress)?;
         let (irradiance, convergence) = solve(&transport, settings.residual)?;
         let leaving = leave(&irradiance);
         let found = Found { leaving: &leaving, irradiance: &irradiance, sky: &sky };

@@ -22,6 +22,9 @@ use std::f64::consts::PI;
 /// Where a patch's places get less than this part of the light of its brightest one, an edge of a shadow is about: more are looked
 /// at.
 const EVEN: f32 = 0.7;
+/// Not at patches smaller than this part of the shortest edge that is split: those of a file's fine triangles, many of which
+/// together have an even share of light and shadow.
+const SMALL: f64 = 0.4;
 /// Fewest shadow rays of a place.
 const LEAST_SHADOW_RAYS: u32 = 4;
 
@@ -59,6 +62,8 @@ impl Patches {
     ) -> Result<Self> {
         let Lamps { optics, emitters } = lamps;
         let bvh = &optics.bvh;
+        let diagonal = bvh.scene().bounds().map_or(0.0, |(low, high)| (high - low).length());
+        let smallest = SMALL * settings.shortest_element * diagonal;
         progress.start("direct light on patches", senders.all.len() as u64);
         let found: Vec<[Vec3; 5]> = senders
             .all
@@ -109,7 +114,8 @@ impl Patches {
                     (sums.map(|sum| sum / share as f32), low < EVEN * high)
                 };
                 let (found, uneven) = look(&mesh.places(sender));
-                sums = match uneven && sender.corner.is_none() {
+                let large = mesh.longest_edge(sender.element as usize) > smallest;
+                sums = match uneven && large && sender.corner.is_none() {
                     true => look(&mesh.many_places(sender.element)).0,
                     false => found,
                 };
