@@ -19,7 +19,7 @@ pub(super) const DRAWN_IN: f64 = 0.02;
 /// Height above an element, over its longest edge, at which its points look at each other.
 pub(super) const LIFT: f64 = 0.005;
 /// Into how many parts a side of an element is cut where light is uneven.
-const MANY: u32 = 6;
+const MANY: u8 = 6;
 /// A split: its two children stand side by side.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Node {
@@ -119,8 +119,75 @@ impl Element {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sender {
     pub(crate) element: u32,
-    /// Which corner's share of the element, if it is cut through.
-    pub(crate) corner: Option<u8>,
+    pub(crate) part: Part,
+}
+
+/// Which part of a leaf a sender is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Part {
+    Whole,
+    /// A corner's share of a leaf that is cut through.
+    Corner(u8),
+    /// One of [`PIECES`] equal triangles of a leaf that is lit unevenly.
+    Piece(u8),
+}
+
+/// Pieces along an edge of a leaf that is lit unevenly: those that stand upright, row by row, then those on their heads.
+const ALONG: u8 = 3;
+/// Pieces of a leaf that is lit unevenly.
+pub(crate) const PIECES: usize = (ALONG * ALONG) as usize;
+
+/// The piece that a place of a leaf lies in, by the weights of its second and third corner.
+fn piece(u: f64, v: f64) -> u8 {
+    let last = f64::from(ALONG - 1);
+    let (x, y) = (u * f64::from(ALONG), v * f64::from(ALONG));
+    let j = y.floor().clamp(0.0, last);
+    let i = x.floor().clamp(0.0, last - j);
+    let (x, y, i, j) = (x - i, y - j, i as u8, j as u8);
+    if x + y > 1.0 && i + j < ALONG - 1 { upright(ALONG) + row(ALONG - 1, j) + i } else { row(ALONG, j) + i }
+}
+
+/// Middles of `n`² equal triangles of a leaf in the order of [`piece`]: weights of its second and third corner.
+fn middles(n: u8) -> impl Iterator<Item = (f64, f64)> {
+    let part = 1.0 / f64::from(3 * u32::from(n));
+    // Those that stand upright, and those between them that stand on their heads.
+    let middles = move |third: u8, rows: u8| {
+        let at = move |k: u8| f64::from(3 * u32::from(k) + u32::from(third)) * part;
+        (0..rows).flat_map(move |j| (0..rows - j).map(move |i| (at(i), at(j))))
+    };
+    middles(1, n).chain(middles(2, n - 1))
+}
+
+impl Part {
+    /// How much each of the leaf's corners counts in its mean.
+    pub(crate) fn weights(self) -> [f32; 3] {
+        match self {
+            Self::Whole => [1.0 / 3.0; 3],
+            Self::Corner(k) => std::array::from_fn(|c| if c == usize::from(k) { 1.0 } else { 0.0 }),
+            Self::Piece(k) => {
+                let (u, v) = middles(ALONG).nth(usize::from(k)).unwrap_or((1.0 / 3.0, 1.0 / 3.0));
+                [1.0 - u - v, u, v].map(|w| w as f32)
+            }
+        }
+    }
+
+    /// Its share of the leaf's area.
+    pub(crate) fn share(self) -> f64 {
+        match self {
+            Self::Whole => 1.0,
+            Self::Corner(_) => 1.0 / 3.0,
+            Self::Piece(_) => 1.0 / PIECES as f64,
+        }
+    }
+}
+
+/// Upright pieces in `n` rows, and those before row `j` of them.
+const fn upright(n: u8) -> u8 {
+    n * (n + 1) / 2
+}
+
+const fn row(n: u8, j: u8) -> u8 {
+    j * n - j * j.saturating_sub(1) / 2
 }
 
 /// All senders, and the first one of each leaf.
@@ -152,12 +219,27 @@ impl Elements {
         for e in self.leaves() {
             senders.of[e as usize] = senders.all.len() as u32;
             if self.elements[e as usize].cut {
-                senders.all.extend((0..3).map(|k| Sender { element: e, corner: Some(k) }));
+                senders.all.extend((0..3).map(|k| Sender { element: e, part: Part::Corner(k) }));
             } else {
-                senders.all.push(Sender { element: e, corner: None });
+                senders.all.push(Sender { element: e, part: Part::Whole });
             }
         }
         senders
+    }
+
+    /// The same with the chosen ones, whole leaves all, in pieces; `parted` has one flag for each of `senders`.
+    pub(crate) fn parted(&self, senders: &Senders, parted: impl Fn(usize) -> bool) -> Senders {
+        let mut finer = Senders { of: vec![NONE; self.elements.len()], all: Vec::with_capacity(senders.all.len()) };
+        for (number, sender) in senders.all.iter().enumerate() {
+            let first = &mut finer.of[sender.element as usize];
+            *first = (*first).min(finer.all.len() as u32);
+            if parted(number) {
+                finer.all.extend((0..PIECES as u8).map(|k| Sender { part: Part::Piece(k), ..*sender }));
+            } else {
+                finer.all.push(*sender);
+            }
+        }
+        finer
     }
 
     /// The sender of a leaf for a point on it; for a leaf that is cut through, the one of the nearest corner that the
@@ -165,8 +247,10 @@ impl Elements {
     pub(crate) fn sender(&self, bvh: &SceneBvh, senders: &Senders, e: u32, weights: [f32; 3]) -> Option<u32> {
         let first = senders.of[e as usize];
         let element = &self.elements[e as usize];
-        if !element.cut {
-            return Some(first);
+        match senders.all[first as usize].part {
+            Part::Whole => return Some(first),
+            Part::Piece(_) => return Some(first + u32::from(piece(f64::from(weights[1]), f64::from(weights[2])))),
+            Part::Corner(_) => {}
         }
         let corners = self.corners(e as usize);
         let point = corners[0] * f64::from(weights[0])
@@ -177,7 +261,7 @@ impl Elements {
         order.sort_by(|&a, &b| weights[b as usize].total_cmp(&weights[a as usize]));
         let seen = |&&k: &&u8| {
             let vertex = &self.vertices[element.corners[k as usize] as usize];
-            !vertex.buried && !bvh.occluded(point + lift, self.place(Sender { element: e, corner: Some(k) }) + lift)
+            !vertex.buried && !bvh.occluded(point + lift, self.near_corner(e, k) + lift)
         };
         // A body that stands in the element hides corners by its own edges, too: what is outside of it is then one side.
         let buried = |k: u8| self.vertices[element.corners[k as usize] as usize].buried;
@@ -186,35 +270,31 @@ impl Elements {
         order.iter().find(seen).or_else(outside).map(|&k| first + u32::from(k))
     }
 
-    /// Where a corner's light is measured and seen: near it, inside the element [m].
-    fn place(&self, sender: Sender) -> DVec3 {
-        let [a, b, c] = self.corners(sender.element as usize);
-        let middle = (a + b + c) / 3.0;
-        sender.corner.map_or(middle, |k| [a, b, c][k as usize].lerp(middle, DRAWN_IN))
+    /// Where the light of a corner's share is measured and seen: near it, inside the element [m].
+    fn near_corner(&self, element: u32, k: u8) -> DVec3 {
+        let [a, b, c] = self.corners(element as usize);
+        [a, b, c][k as usize].lerp((a + b + c) / 3.0, DRAWN_IN)
     }
 
-    /// Points that stand for equal parts of a sender: weights of its triangle's second and third corner.
+    /// Points that stand for equal parts of a leaf, or of a corner's share of it: weights of its triangle's second and third
+    /// corner.
     pub(crate) fn places(&self, sender: Sender) -> Vec<[f64; 2]> {
         let element = &self.elements[sender.element as usize];
         let middle = element.middle();
         let towards = |b: [f64; 2], part: f64| [b[0] + (middle[0] - b[0]) * part, b[1] + (middle[1] - b[1]) * part];
-        match sender.corner {
-            Some(k) => vec![towards(element.barycentric[k as usize], DRAWN_IN)],
-            None => element.barycentric.iter().map(|&b| towards(b, 0.5)).chain([middle]).collect(),
+        match sender.part {
+            Part::Corner(k) => vec![towards(element.barycentric[k as usize], DRAWN_IN)],
+            Part::Whole | Part::Piece(_) => {
+                element.barycentric.iter().map(|&b| towards(b, 0.5)).chain([middle]).collect()
+            }
         }
     }
 
-    /// Middles of [`MANY`]² equal parts of an element, as [`Elements::places`].
-    pub(crate) fn many_places(&self, element: u32) -> Vec<[f64; 2]> {
+    /// Middles of [`MANY`]² equal parts of an element, as [`Elements::places`], each with the piece that it lies in.
+    pub(crate) fn many_places(&self, element: u32) -> Vec<([f64; 2], u8)> {
         let [a, b, c] = self.elements[element as usize].barycentric;
         let at = |u: f64, v: f64| std::array::from_fn(|k| a[k] + (b[k] - a[k]) * u + (c[k] - a[k]) * v);
-        let part = 1.0 / f64::from(3 * MANY);
-        // Parts that stand upright, and those between them that stand on their heads.
-        let middles = |third: u32, rows: u32| {
-            let place = move |i: u32, j: u32| (f64::from(3 * i + third) * part, f64::from(3 * j + third) * part);
-            (0..rows).flat_map(move |j| (0..rows - j).map(move |i| place(i, j)))
-        };
-        middles(1, MANY).chain(middles(2, MANY - 1)).map(|(u, v)| at(u, v)).collect()
+        middles(MANY).map(|(u, v)| (at(u, v), piece(u, v))).collect()
     }
 
     /// At most `most` vertices spread over the mesh.
@@ -227,10 +307,8 @@ impl Elements {
     /// Mean over a sender of what is known at vertices; vertices inside bodies do not count.
     pub(crate) fn mean_over(&self, sender: Sender, x: &[Vec3]) -> Vec3 {
         let corners = self.elements[sender.element as usize].corners;
-        if let Some(k) = sender.corner {
-            return x[corners[k as usize] as usize];
-        }
-        corners.iter().map(|&v| x[v as usize]).sum::<Vec3>() / 3.0
+        let weights = sender.part.weights();
+        corners.iter().zip(weights).map(|(&v, w)| x[v as usize] * w).sum()
     }
 
     /// The leaf at a point of a triangle's side, and the weights of its corners.
@@ -294,4 +372,27 @@ impl Elements {
 
 pub(super) fn rotated<T: Copy>(corners: [T; 3], by: u8) -> [T; 3] {
     std::array::from_fn(|k| corners[(k + by as usize) % 3])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_are_equal_and_found_by_their_middles() {
+        for (number, (u, v)) in middles(ALONG).enumerate() {
+            assert_eq!(usize::from(piece(u, v)), number);
+            let [a, b, c] = Part::Piece(number as u8).weights();
+            assert!(
+                (a + b + c - 1.0).abs() < 1e-6 && (f64::from(b) - u).abs() < 1e-6 && (f64::from(c) - v).abs() < 1e-6
+            );
+        }
+        // Each holds as many of the finer places; corners and edges belong to some piece.
+        let mut counts = [0; PIECES];
+        middles(MANY).for_each(|(u, v)| counts[usize::from(piece(u, v))] += 1);
+        assert_eq!(counts, [4; PIECES]);
+        for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.5), (1.0 / 3.0, 2.0 / 3.0), (-1e-9, 1.0 + 1e-9)] {
+            assert!(usize::from(piece(u, v)) < PIECES);
+        }
+    }
 }

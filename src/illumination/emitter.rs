@@ -51,6 +51,11 @@ impl Emitter {
         self.mean_radiance * (self.area_of_sides() * PI) as f32
     }
 
+    /// Flux of all sides and colours [W].
+    pub(crate) fn power(&self) -> f64 {
+        f64::from(self.flux().element_sum())
+    }
+
     /// Area of all sides that shine [m²].
     pub(crate) fn area_of_sides(&self) -> f64 {
         if self.two_sided { 2.0 * self.area } else { self.area }

@@ -4,6 +4,7 @@
 //! multiplied by the visible part, Σ w v / Σ w over stratified points of the emitter, w = cosθ cosθ′/r². So there is no
 //! noise outside of penumbrae, and none of a patch's shape inside.
 
+use super::elements::NONE;
 use super::emitter::{Emitter, EmitterPoint, Piece};
 use super::form_factor::{FormFactor, point_to_element, point_to_polygon};
 use super::paths::Optics;
@@ -31,9 +32,11 @@ pub(crate) const MOST_REDRAWS: u32 = 32;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Emitters {
     pub(crate) polygons: Vec<Emitter>,
-    /// Triangles whose emission is sampled through `polygons`; the emission of all others goes with radiosity.
-    pub(crate) sampled: Vec<bool>,
-    punctual: Vec<PunctualLight>,
+    /// The polygon through which each triangle's emission is sampled, or [`NONE`]: that of all others goes with radiosity.
+    polygon_of: Vec<u32>,
+    /// Flux of each polygon and those before it, over that of all.
+    reached: Vec<f64>,
+    pub(super) punctual: Vec<PunctualLight>,
     form_factor: FormFactor,
 }
 
@@ -85,12 +88,34 @@ impl Emitters {
         // Strongest first; equal ones in the order of the file, so that the choice is always the same.
         merged.sort_by(|a, b| b.1.flux().element_sum().total_cmp(&a.1.flux().element_sum()).then(a.0[0].cmp(&b.0[0])));
         merged.truncate(MOST_EMITTERS);
-        let mut sampled = vec![false; scene.triangles.len()];
-        for &triangle in merged.iter().flat_map(|(triangles, _)| triangles) {
-            sampled[triangle as usize] = true;
+        let mut polygon_of = vec![NONE; scene.triangles.len()];
+        for (polygon, (triangles, _)) in merged.iter().enumerate() {
+            triangles.iter().for_each(|&triangle| polygon_of[triangle as usize] = polygon as u32);
         }
-        let polygons = merged.into_iter().map(|(_, emitter)| emitter).collect();
-        Self { polygons, sampled, punctual: scene.lights.clone(), form_factor }
+        let polygons: Vec<Emitter> = merged.into_iter().map(|(_, emitter)| emitter).collect();
+        let mut reached: Vec<f64> = Vec::with_capacity(polygons.len());
+        for emitter in &polygons {
+            reached.push(reached.last().copied().unwrap_or(0.0) + emitter.power());
+        }
+        let total = reached.last().copied().unwrap_or(1.0);
+        reached.iter_mut().for_each(|part| *part /= total);
+        Self { polygons, polygon_of, reached, punctual: scene.lights.clone(), form_factor }
+    }
+
+    /// The polygon through which a triangle's emission is sampled.
+    pub(crate) fn polygon(&self, triangle: u32) -> Option<&Emitter> {
+        self.polygons.get(self.polygon_of[triangle as usize] as usize)
+    }
+
+    /// A polygon by its share of all flux, for a number from 0 to 1; there must be one.
+    pub(crate) fn drawn(&self, u: f64) -> usize {
+        self.reached.partition_point(|&part| part <= u).min(self.polygons.len() - 1)
+    }
+
+    /// How densely points of a polygon lie in the direction of `span` when polygons are drawn by flux and points by area [1/sr].
+    pub(super) fn density(&self, emitter: &Emitter, span: DVec3) -> f64 {
+        let part = emitter.power() / self.polygons.iter().map(Emitter::power).sum::<f64>();
+        part * span.length_squared() * span.length() / (emitter.area * emitter.normal.dot(span).abs())
     }
 
     /// Which emitters every point of a flat piece of a surface sees whole.
@@ -147,13 +172,7 @@ impl Emitters {
             }
             sum += tally.mean() * factor as f32;
         }
-        let arriving = |light: &PunctualLight| match punctual_light(optics.bvh.size(), light, at) {
-            Some((strength, end)) if light.kind == LightKind::Eye => strength * optics.seen_from(end, point),
-            Some((strength, end)) => strength * optics.transmittance(point, end),
-            None => Vec3::ZERO,
-        };
-        let points = self.punctual.iter().map(arriving).sum();
-        (sum * self.scale(), points)
+        (sum * self.scale(), self.punctual.iter().map(|light| arriving(optics, light, at, |_| Vec3::ONE)).sum())
     }
 
     /// The factor by which a transfer differs from Lambert's.
@@ -277,6 +296,27 @@ pub(crate) fn punctual_light(size: f64, light: &PunctualLight, at: ShadingPoint)
     }
     let end = if distance.is_finite() { light.position.as_dvec3() } else { point + towards * (2.0 * size) };
     Some((light.intensity * (strength * cosine * FRAC_1_PI) as f32, end))
+}
+
+/// Irradiance over π that arrives from a punctual light, times a factor of the unit direction to it; shadows are looked for
+/// where that is not zero.
+pub(super) fn arriving(
+    optics: &Optics,
+    light: &PunctualLight,
+    at: ShadingPoint,
+    factor: impl Fn(DVec3) -> Vec3,
+) -> Vec3 {
+    let Some((strength, end)) = punctual_light(optics.bvh.size(), light, at) else { return Vec3::ZERO };
+    let strength = strength * factor((end - at.position).normalize());
+    if strength.max_element() <= 0.0 {
+        return Vec3::ZERO;
+    }
+    let seen = if light.kind == LightKind::Eye {
+        optics.seen_from(end, at.position)
+    } else {
+        optics.transmittance(at.position, end)
+    };
+    strength * seen
 }
 
 /// What all surfaces would show, in the sum of the colours, if the emitters' light were spread evenly over a closed room

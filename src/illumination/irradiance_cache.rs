@@ -7,10 +7,10 @@
 //! A vertex's value depends on the vertex alone, so that it is the same whoever computes it, and twice if two do at once.
 
 use super::shading::DiffuseLight;
-use super::{Illumination, Surface};
+use super::{Illumination, LobeRay, Surface};
 use crate::random::Random;
 use crate::scene::bvh::{Hit, Ray, SceneBvh, Sides};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::array::from_fn;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -152,6 +152,14 @@ impl DiffuseLight for IrradianceCache<'_> {
             return surface.emission;
         }
         surface.emission + surface.albedo * self.received(hit, footprint)
+    }
+
+    fn glints(&self, surface: &Surface, direction: DVec3, rays: u32, random: &mut Random) -> Vec3 {
+        self.light.glints(surface, direction, rays, random)
+    }
+
+    fn part_of_lobe(&self, hit: &Hit, ray: &Ray, lobe: &LobeRay) -> f32 {
+        self.light.part_of_lobe(hit, ray, lobe)
     }
 }
 

@@ -35,6 +35,7 @@ mod emitter;
 mod emitters;
 mod flat_mirrors;
 mod form_factor;
+mod glints;
 mod images;
 #[cfg(test)]
 mod images_tests;
@@ -61,6 +62,7 @@ mod tests;
 mod transport;
 
 pub use form_factor::FormFactor;
+pub(crate) use glints::LobeRay;
 pub(crate) use irradiance_cache::IrradianceCache;
 pub use radiosity::Convergence;
 pub(crate) use shading::DiffuseLight;
@@ -250,17 +252,16 @@ impl Illumination {
         progress.start("meshing surfaces", 0);
         let lit = |triangle: u32, front: bool| {
             let material = scene.material(triangle);
-            let weak = material.emissive.max_element() > 0.0 && !emitters.sampled[triangle as usize];
+            let weak = material.emissive.max_element() > 0.0 && emitters.polygon(triangle).is_none();
             (front || material.double_sided) && !material.unlit && (may_scatter(material) || weak)
         };
         let mesh = Elements::new(&bvh, fineness, settings.seed ^ 0xe1e, lit, progress)?;
-        let senders = mesh.senders();
         progress.check()?;
         let lamps = Lamps { optics: &optics, emitters: &emitters };
         let images = Images::new(lamps, &mesh.some_places(MOST_PLACES, bvh.offset()));
         let weak = weak_light(lamps, &images, &mesh, settings.seed ^ 0x3ea7, progress)?;
         let clear = clear_views(lamps, &mesh);
-        let mut patches = Patches::new(lamps, &images, &mesh, &senders, &clear, &settings, progress)?;
+        let (mut patches, senders) = Patches::new(lamps, &images, &mesh, &clear, &settings, progress)?;
         for (direct, &sender) in patches.direct.iter_mut().zip(&senders.all) {
             *direct += mesh.mean_over(sender, &weak);
         }
@@ -383,9 +384,7 @@ fn weak_light(lamps: Lamps, images: &Images, mesh: &Elements, seed: u64, progres
 }
 
 fn may_scatter(material: &crate::scene::Material) -> bool {
-    let metal = material.metallic >= 1.0
-        && material.roughness < reflection::WIDE_LOBE
-        && material.metallic_roughness_texture.is_none();
+    let metal = material.metallic >= 1.0 && material.metallic_roughness_texture.is_none();
     material.base_color.max_element() > 0.0 && !metal && material.transmission < 1.0
 }
 

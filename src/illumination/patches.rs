@@ -1,7 +1,7 @@
 //! What patches of the mesh do to light, what they get of it first, and where it goes.
 
 use super::IlluminationSettings;
-use super::elements::{Elements, Senders};
+use super::elements::{Elements, PIECES, Part, Sender, Senders};
 use super::emitter::Emitter;
 use super::emitters::{Emitters, ShadowRays, VisibleEmitters};
 use super::images::Images;
@@ -22,6 +22,8 @@ use std::f64::consts::PI;
 /// Where a patch's places get less than this part of the light of its brightest one, an edge of a shadow is about: more are looked
 /// at.
 const EVEN: f32 = 0.7;
+/// The same for places of neighbours: an edge may run between the places of two leaves.
+const EVEN_ABOUT: f32 = 0.5;
 /// Not at patches smaller than this part of the shortest edge that is split: those of a file's fine triangles, many of which
 /// together have an even share of light and shadow.
 const SMALL: f64 = 0.4;
@@ -49,84 +51,131 @@ pub(crate) struct Found<'a> {
     pub(crate) sky: &'a [Vec3],
 }
 
+/// What is found at a place: albedo, direct light, punctual light, emission.
+type Place = [Vec3; 4];
+
+/// What is found on a leaf, or on a corner's share of it.
+enum Seen {
+    /// Nothing: it lies inside a body.
+    Buried,
+    /// The same about everywhere: the mean, and the least and most direct light of its places.
+    Even(Place, [f32; 2]),
+    /// Light differs from piece to piece.
+    Pieces([Place; PIECES]),
+}
+
 impl Patches {
-    /// Reads materials and samples direct light at a few places of each sender.
+    /// Reads materials and samples direct light at a few places of each leaf; at many where they differ, and then the leaf
+    /// sends its light from pieces. Also gives the senders.
     pub(crate) fn new(
         lamps: Lamps,
         images: &Images,
         mesh: &Elements,
-        senders: &Senders,
         clear: &[VisibleEmitters],
         settings: &IlluminationSettings,
         progress: &Progress,
-    ) -> Result<Self> {
+    ) -> Result<(Self, Senders)> {
         let Lamps { optics, emitters } = lamps;
         let bvh = &optics.bvh;
         let diagonal = bvh.scene().bounds().map_or(0.0, |(low, high)| (high - low).length());
         let smallest = SMALL * settings.shortest_element * diagonal;
-        progress.start("direct light on patches", senders.all.len() as u64);
-        let found: Vec<[Vec3; 5]> = senders
-            .all
-            .par_iter()
-            .enumerate()
-            .map(|(number, &sender)| {
-                progress.advance(1);
-                let element = &mesh.elements[sender.element as usize];
-                let buried = sender.corner.is_some_and(|k| mesh.vertices[element.corners[k as usize] as usize].buried);
-                let mut sums = [Vec3::ZERO; 5];
-                if buried || progress.stopped() {
-                    return sums;
-                }
-                let area = mesh.area(sender.element) / if sender.corner.is_some() { 3.0 } else { 1.0 };
-                let mut random = Random::new(settings.seed ^ 0x1ea, number as u64);
-                let mut look = |places: &[[f64; 2]]| {
-                    // A share of the rays of a picture's point at each place: the mean over the patch is what counts.
-                    let share = places.len() as u32;
-                    let rays = ShadowRays {
-                        // One ray tells whether it arrives, not how much of the lamp does.
-                        first: settings.shadow_rays.div_ceil(share).max(LEAST_SHADOW_RAYS),
-                        penumbra: 0,
-                        clear: clear[sender.element as usize],
-                    };
-                    let width = (area / places.len() as f64).sqrt();
-                    let (mut low, mut high) = (f32::INFINITY, 0.0f32);
-                    let mut sums = [Vec3::ZERO; 5];
-                    for &barycentric in places {
-                        let position = bvh.scene().triangles[element.triangle as usize].at(barycentric);
-                        let front = element.front;
-                        let hit = Hit { triangle: element.triangle, distance: 0.0, position, barycentric, front };
-                        let surface = Surface::at(bvh.scene(), &hit, width);
-                        let at = surface.shading_point(bvh.offset());
-                        let (areas, points) = emitters.light(optics, at, rays, &mut random);
-                        // Counted where it arrives, as that of punctual lights is.
-                        let sky = bvh.scene().environment.as_ref().map_or(Vec3::ZERO, |around| {
-                            sky::bright(around, optics, at, rays, &mut random) * emitters.scale()
-                        });
-                        let direct = areas + points + sky + images.strong(lamps, at, rays, &mut random);
-                        (low, high) = (low.min(direct.element_sum()), high.max(direct.element_sum()));
-                        sums[0] += surface.albedo;
-                        sums[1] += direct;
-                        sums[2] += points + sky;
-                        if !emitters.sampled[element.triangle as usize] {
-                            sums[3] += surface.emission;
-                        }
-                    }
-                    (sums.map(|sum| sum / share as f32), low < EVEN * high)
-                };
-                let (found, uneven) = look(&mesh.places(sender));
-                let large = mesh.longest_edge(sender.element as usize) > smallest;
-                sums = match uneven && large && sender.corner.is_none() {
-                    true => look(&mesh.many_places(sender.element)).0,
-                    false => found,
-                };
-                sums[4] = Vec3::splat(area as f32);
-                sums
-            })
-            .collect();
+        let leaves = mesh.senders();
+        progress.start("direct light on patches", leaves.all.len() as u64);
+        let look = |sender: Sender, barycentric: [f64; 2], share: usize, random: &mut Random| -> Place {
+            // A share of the rays of a picture's point at each place: the mean over the patch is what counts.
+            let rays = ShadowRays {
+                // One ray tells whether it arrives, not how much of the lamp does.
+                first: settings.shadow_rays.div_ceil(share as u32).max(LEAST_SHADOW_RAYS),
+                penumbra: 0,
+                clear: clear[sender.element as usize],
+            };
+            let element = &mesh.elements[sender.element as usize];
+            let area = mesh.area(sender.element) * sender.part.share();
+            let position = bvh.scene().triangles[element.triangle as usize].at(barycentric);
+            let front = element.front;
+            let hit = Hit { triangle: element.triangle, distance: 0.0, position, barycentric, front };
+            let surface = Surface::at(bvh.scene(), &hit, (area / share as f64).sqrt());
+            let at = surface.shading_point(bvh.offset());
+            let (areas, points) = emitters.light(optics, at, rays, random);
+            // Counted where it arrives, as that of punctual lights is.
+            let sky = bvh
+                .scene()
+                .environment
+                .as_ref()
+                .map_or(Vec3::ZERO, |around| sky::bright(around, optics, at, rays, random) * emitters.scale());
+            let direct = areas + points + sky + images.strong(lamps, at, rays, random);
+            let own = emitters.polygon(element.triangle).is_none();
+            [surface.albedo, direct, points + sky, if own { surface.emission } else { Vec3::ZERO }]
+        };
+        let few = |(number, &sender): (usize, &Sender)| {
+            progress.advance(1);
+            let element = &mesh.elements[sender.element as usize];
+            let buried = |k: u8| mesh.vertices[element.corners[k as usize] as usize].buried;
+            if matches!(sender.part, Part::Corner(k) if buried(k)) || progress.stopped() {
+                return Seen::Buried;
+            }
+            let mut random = Random::new(settings.seed ^ 0x1ea, number as u64);
+            let places = mesh.places(sender);
+            let seen: Vec<Place> = places.iter().map(|&at| look(sender, at, places.len(), &mut random)).collect();
+            let strengths = seen.iter().map(|place| place[1].element_sum());
+            let range = strengths.fold([f32::INFINITY, 0.0f32], |[low, high], s| [low.min(s), high.max(s)]);
+            Seen::Even(mean(seen), range)
+        };
+        let mut seen: Vec<Seen> = leaves.all.par_iter().enumerate().map(few).collect();
         progress.check()?;
+        // What the places of a leaf and of those about it find at each of its vertices.
+        let mut about = vec![[f32::INFINITY, 0.0f32]; mesh.vertices.len()];
+        for (leaf, seen) in leaves.all.iter().zip(&seen) {
+            if let Seen::Even(_, [low, high]) = seen {
+                for v in mesh.elements[leaf.element as usize].corners {
+                    let [l, h] = &mut about[v as usize];
+                    (*l, *h) = (l.min(*low), h.max(*high));
+                }
+            }
+        }
+        progress.start("shadows on patches", leaves.all.len() as u64);
+        seen.par_iter_mut().zip(&leaves.all).enumerate().for_each(|(number, (seen, &leaf))| {
+            progress.advance(1);
+            let Seen::Even(_, [low, high]) = *seen else { return };
+            let large = mesh.longest_edge(leaf.element as usize) > smallest;
+            let vertices = mesh.elements[leaf.element as usize].corners.map(|v| about[v as usize]);
+            let [least, most] = vertices.iter().fold([low, high], |[l, h], v| [l.min(v[0]), h.max(v[1])]);
+            let even = low >= EVEN * high && least >= EVEN_ABOUT * most;
+            if even || !large || leaf.part != Part::Whole || progress.stopped() {
+                return;
+            }
+            let places = mesh.many_places(leaf.element);
+            let mut random = Random::new(settings.seed ^ 0x1eb, number as u64);
+            let mut pieces: [Vec<Place>; PIECES] = Default::default();
+            for &(place, piece) in &places {
+                pieces[usize::from(piece)].push(look(leaf, place, places.len(), &mut random));
+            }
+            *seen = Seen::Pieces(pieces.map(mean));
+        });
+        progress.check()?;
+        let senders = mesh.parted(&leaves, |number| matches!(seen[number], Seen::Pieces(_)));
+        let mut found: Vec<Place> = Vec::with_capacity(senders.all.len());
+        let mut area = Vec::with_capacity(senders.all.len());
+        for (leaf, seen) in leaves.all.iter().zip(&seen) {
+            let whole = mesh.area(leaf.element) as f32;
+            match seen {
+                Seen::Buried => {
+                    found.push(Place::default());
+                    area.push(0.0);
+                }
+                Seen::Even(place, _) => {
+                    found.push(*place);
+                    area.push(whole * leaf.part.share() as f32);
+                }
+                Seen::Pieces(pieces) => {
+                    found.extend(pieces);
+                    area.extend([whole / PIECES as f32; PIECES]);
+                }
+            }
+        }
         let column = |k: usize| found.iter().map(|f| f[k]).collect();
-        let area = found.iter().map(|f| f[4].x).collect();
-        Ok(Self { albedo: column(0), direct: column(1), punctual: column(2), emission: column(3), area })
+        let patches = Self { albedo: column(0), direct: column(1), punctual: column(2), emission: column(3), area };
+        Ok((patches, senders))
     }
 
     /// Adds the light of photons to what senders get directly.
@@ -169,10 +218,9 @@ impl Patches {
             add(0, (self.emission[s] + self.punctual[s] + mesh.mean_over(sender, sky)) * flux);
             add(1, (Vec3::ONE - self.albedo[s]) * arriving * flux);
             let corners = mesh.elements[sender.element as usize].corners;
-            let chosen = sender.corner.map_or(&corners[..], |k| &corners[k as usize..=k as usize]);
-            let n = chosen.len() as f32;
-            let losses = chosen.iter().map(|&v| losses[v as usize]);
-            let (escaped, black) = losses.fold((Vec3::ZERO, Vec3::ZERO), |sum, l| (sum.0 + l.0 / n, sum.1 + l.1 / n));
+            let losses = corners.iter().map(|&v| losses[v as usize]).zip(sender.part.weights());
+            let (escaped, black) =
+                losses.fold((Vec3::ZERO, Vec3::ZERO), |sum, (l, w)| (sum.0 + l.0 * w, sum.1 + l.1 * w));
             add(2, leaving[s] * flux * escaped);
             add(1, leaving[s] * flux * black);
         }
@@ -184,6 +232,11 @@ impl Patches {
     }
 }
 
+fn mean(places: Vec<Place>) -> Place {
+    let n = places.len().max(1) as f32;
+    std::array::from_fn(|k| places.iter().map(|place| place[k]).sum::<Vec3>() / n)
+}
+
 /// Rays that find out what becomes of the light of emitters. Their places and directions fill space evenly: the parts found are
 /// off by some 1e-4.
 const RAYS_OF_EMITTERS: u32 = 1 << 16;
@@ -191,26 +244,16 @@ const RAYS_OF_EMITTERS: u32 = 1 << 16;
 /// Flux of emitters that leaves the scene without a diffuse surface on its way, and what ends on black or in optics before it
 /// comes to one [W].
 fn lost_from_emitters(around: &Surroundings, emitters: &Emitters, seed: u64) -> (Vec3, Vec3) {
-    let power = |emitter: &Emitter| f64::from(emitter.flux().element_sum());
-    let total: f64 = emitters.polygons.iter().map(power).sum();
+    let total: f64 = emitters.polygons.iter().map(Emitter::power).sum();
     if total <= 0.0 {
         return (Vec3::ZERO, Vec3::ZERO);
     }
-    let mut below = 0.0;
-    let reached: Vec<f64> = emitters
-        .polygons
-        .iter()
-        .map(|emitter| {
-            below += power(emitter) / total;
-            below
-        })
-        .collect();
     let mut random = Random::new(seed ^ 0xe4e, 0);
     let shift: [f64; 4] = std::array::from_fn(|_| random.uniform());
     let scene = around.optics.scene();
     let one = |shot: u32| {
         let u = (f64::from(shot) + 0.5) / f64::from(RAYS_OF_EMITTERS);
-        let emitter = &emitters.polygons[reached.partition_point(|&r| r <= u).min(reached.len() - 1)];
+        let emitter = &emitters.polygons[emitters.drawn(u)];
         let [s, t, a, b] = sampling::spread(shift, u64::from(shot));
         let point = emitter.point(s, t);
         let normal = if emitter.two_sided && shot % 2 == 1 { -emitter.normal } else { emitter.normal };
@@ -219,7 +262,7 @@ fn lost_from_emitters(around: &Surroundings, emitters: &Emitters, seed: u64) -> 
         let mut random = Random::new(seed ^ 0xe4f, u64::from(shot));
         let (end, tint) = around.follow(ray, &mut random);
         // Polygons are drawn by their mean radiance.
-        let share = total / (power(emitter) * f64::from(RAYS_OF_EMITTERS));
+        let share = total / (emitter.power() * f64::from(RAYS_OF_EMITTERS));
         let local = emitter.radiance(scene, point) * (emitter.area_of_sides() * PI * share) as f32;
         match end {
             RayEnd::Escaped { .. } => (local * tint, local * (Vec3::ONE - tint)),

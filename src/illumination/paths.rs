@@ -1,7 +1,9 @@
 //! How a ray goes on at mirrors, glossy metals and glass.
 
 use super::flat_mirrors::FlatMirrors;
-use super::reflection::{MIRROR_ALPHA, WIDE_LOBE, dielectric_reflectance, ggx_half, ggx_weight, reflected, refracted};
+use super::reflection::{
+    MIRROR_ALPHA, dielectric_reflectance, ggx_half, ggx_weight, has_wide_lobe, reflected, refracted,
+};
 use super::surface::Surface;
 use crate::random::Random;
 use crate::scene::bvh::{Hit, Meeting, Ray, SceneBvh, Sides};
@@ -189,10 +191,9 @@ impl Ways {
         let half = if half.dot(direction) < 0.0 { half } else { surface.facing };
         let cosine = -half.dot(direction);
         let mut mirrored = reflected(direction, half);
-        let view = direction.dot(surface.normal).abs();
-        let masking =
-            |out: DVec3| if rough { ggx_weight(view, out.dot(surface.normal).abs(), alpha) as f32 } else { 1.0 };
-        let mut reflectance = surface.fresnel(cosine) * masking(mirrored);
+        // What a rough surface would send below its horizon stays in its grooves.
+        let masking = |out: DVec3| if rough { ggx_weight(out.dot(surface.normal), alpha) as f32 } else { 1.0 };
+        let reflectance = surface.reflectance(cosine) * masking(mirrored);
         if mirrored.dot(surface.facing) <= 0.0 {
             // Bent normals may mirror a ray into the surface; flat mirroring is the nearest that can be seen.
             mirrored = reflected(direction, surface.facing);
@@ -200,21 +201,18 @@ impl Ways {
         let mut ways = Self { half, mirrored, reflectance, through: direction, transmittance: Vec3::ZERO, ratio: 1.0 };
         if surface.transmission.max_element() > 0.0 {
             if surface.volume {
-                ways.ratio = if surface.front { 1.0 / surface.ior } else { surface.ior };
-                let part = dielectric_reflectance(cosine, ways.ratio) as f32;
-                reflectance = Vec3::splat(part) * masking(mirrored);
+                ways.ratio = surface.ratio();
                 if let Some(through) = refracted(direction, half, ways.ratio) {
                     ways.through = through;
+                    let part = dielectric_reflectance(cosine, ways.ratio) as f32;
                     // The tint of base colour is met once on the way in; inside, absorption colours.
                     let tint = if surface.front { surface.transmission } else { Vec3::ONE };
-                    ways.transmittance = tint * (1.0 - part);
+                    let below = if rough { ggx_weight(-through.dot(surface.normal), alpha) as f32 } else { 1.0 };
+                    ways.transmittance = tint * ((1.0 - part) * below);
                 }
             } else {
-                let both = surface.thin_wall_reflectance(cosine);
-                reflectance = Vec3::splat(both) * masking(mirrored);
-                ways.transmittance = surface.transmission * (1.0 - both);
+                ways.transmittance = surface.transmission * (1.0 - surface.thin_wall_reflectance(cosine));
             }
-            ways.reflectance = reflectance;
         }
         ways
     }
@@ -222,7 +220,7 @@ impl Ways {
 
 /// Whether a material does more than scatter diffusely.
 fn is_optical(material: &Material) -> bool {
-    let wide = material.roughness >= WIDE_LOBE && material.metallic_roughness_texture.is_none();
+    let wide = has_wide_lobe(material.roughness, material.metallic) && material.metallic_roughness_texture.is_none();
     let shines = material.metallic > 0.0 || (material.specular > 0.0 && material.ior != 1.0);
     !material.unlit
         && (material.transmission > 0.0 || (shines && !wide) || matches!(material.alpha_mode, AlphaMode::Blend))

@@ -6,8 +6,16 @@ use glam::DVec3;
 
 /// GGX α below which a lobe is narrower than a pixel of any picture: a mirror.
 pub(crate) const MIRROR_ALPHA: f32 = 2e-3;
-/// Perceptual roughness from which a specular lobe is so wide that light transport takes it for diffuse.
-pub(crate) const WIDE_LOBE: f32 = 0.5;
+/// Perceptual roughness from which the weak specular lobe of a dielectric is so wide that it is taken for diffuse.
+const WIDE_LOBE: f32 = 0.5;
+/// Metalness below which a surface is taken for a dielectric there.
+const LEAST_METAL: f32 = 0.1;
+
+/// Whether light transport takes a specular lobe for diffuse: a wide one of a dielectric. That of a metal is all its light,
+/// and is followed however wide.
+pub(crate) fn has_wide_lobe(roughness: f32, metallic: f32) -> bool {
+    roughness >= WIDE_LOBE && metallic < LEAST_METAL
+}
 
 /// Direction of a mirrored ray.
 pub(crate) fn reflected(direction: DVec3, normal: DVec3) -> DVec3 {
@@ -55,15 +63,31 @@ pub(crate) fn ggx_half(view: DVec3, normal: DVec3, alpha: f64, random: &mut Rand
     (x * (h.x * alpha) + y * (h.y * alpha) + normal * h.z.max(0.0)).normalize_or(normal)
 }
 
-/// Weight of a direction that was drawn through [`ggx_half`]: Smith's height-correlated G₂ over G₁ (Heitz 2014), for
-/// the cosines of the directions to the viewer and to the light with the normal.
-pub(crate) fn ggx_weight(view: f64, light: f64, alpha: f64) -> f64 {
-    let lambda = |cosine: f64| {
-        let squared = (cosine * cosine).max(1e-12);
-        0.5 * ((1.0 + alpha * alpha * (1.0 - squared) / squared).sqrt() - 1.0)
-    };
-    let (v, l) = (lambda(view), lambda(light));
-    (1.0 + v) / (1.0 + v + l)
+/// Smith's masking G₁ of GGX for a cosine with the normal (Walter et al. 2007).
+pub(crate) fn ggx_masking(cosine: f64, alpha: f64) -> f64 {
+    let squared = (cosine * cosine).max(1e-12);
+    2.0 / (1.0 + (1.0 + alpha * alpha * (1.0 - squared) / squared).sqrt())
+}
+
+/// Weight of a direction that was drawn through [`ggx_half`]: G₂ over G₁ of the viewer. glTF's G₂ (appendix B.3.2) is the
+/// product of both sides' G₁, so that what is left is G₁ of the direction drawn; zero below the surface.
+pub(crate) fn ggx_weight(light: f64, alpha: f64) -> f64 {
+    if light > 0.0 { ggx_masking(light, alpha) } else { 0.0 }
+}
+
+/// How densely directions lie about `light` that are mirrored at half vectors drawn by [`ggx_half`]: D·G₁/(4 cosθᵥ) [1/sr], for
+/// directions to the viewer and to the light. Zero for one below the surface.
+pub(crate) fn ggx_density(view: DVec3, light: DVec3, normal: DVec3, alpha: f64) -> f64 {
+    let v = view.dot(normal);
+    if v <= 0.0 || light.dot(normal) <= 0.0 {
+        return 0.0;
+    }
+    let half = (view + light).normalize();
+    // 1 − cos² by the cross product: the cosine of a narrow lobe is too near to one.
+    let (sine, cosine) = (half.cross(normal).length_squared(), half.dot(normal).powi(2));
+    let spread = sine + alpha * alpha * cosine;
+    let d = alpha * alpha / (std::f64::consts::PI * spread * spread);
+    d * ggx_masking(v, alpha) / (4.0 * v)
 }
 
 #[cfg(test)]
@@ -100,8 +124,13 @@ mod tests {
                     let z2 = (view + light).normalize().z.powi(2);
                     let d = alpha * alpha / (std::f64::consts::PI * (z2 * (alpha * alpha - 1.0) + 1.0).powi(2));
                     let lambda = |z: f64| 0.5 * ((1.0 + alpha * alpha * (1.0 - z * z) / (z * z)).sqrt() - 1.0);
-                    let g = 1.0 / (1.0 + lambda(view.z) + lambda(cos));
-                    integral += d * g / (4.0 * view.z) * std::f64::consts::TAU / f64::from(n * n);
+                    let g = 1.0 / ((1.0 + lambda(view.z)) * (1.0 + lambda(cos)));
+                    let lobe = d * g / (4.0 * view.z);
+                    integral += lobe * std::f64::consts::TAU / f64::from(n * n);
+                    if (i + j) % 97 == 0 {
+                        let own = ggx_density(view, light, DVec3::Z, alpha) * ggx_weight(cos, alpha);
+                        assert!((own - lobe).abs() <= 1e-6 * lobe, "α = {alpha}: {own}, not {lobe}");
+                    }
                 }
             }
             let mut random = Random::new(1, 0);
@@ -109,7 +138,7 @@ mod tests {
             let drawn: f64 = (0..draws)
                 .map(|_| {
                     let out = reflected(-view, ggx_half(view, DVec3::Z, alpha, &mut random));
-                    if out.z > 0.0 { ggx_weight(view.z, out.z, alpha) } else { 0.0 }
+                    ggx_weight(out.z, alpha)
                 })
                 .sum::<f64>()
                 / f64::from(draws);

@@ -3,7 +3,7 @@
 use super::elements::NONE;
 use super::emitters::ShadowRays;
 use super::radiosity::RayEnd;
-use super::{Illumination, Surface, sampling, sky};
+use super::{Illumination, LobeRay, Surface, sampling, sky};
 use crate::random::Random;
 use crate::scene::bvh::{Hit, Ray};
 use glam::{DVec3, Vec3};
@@ -19,16 +19,31 @@ struct MeshPoint {
     weights: [f32; 3],
 }
 
-/// What surfaces show to a look, wherever it is kept.
+/// What surfaces show to a look of the light that they scatter, wherever it is kept.
 pub(crate) trait DiffuseLight {
     /// Radiance that a surface's diffuse part and its emission send out at a hit [W/(m² sr)]; a pixel is `footprint` wide
     /// there [m], and a mean is taken over `share` looks like this.
     fn shown(&self, hit: &Hit, surface: &Surface, footprint: f64, share: u32, random: &mut Random) -> Vec3;
+
+    /// Radiance that a glossy surface sends back against `direction` from lights without a size, and what of lamps' light is not
+    /// left to `rays` into its lobe [W/(m² sr)].
+    fn glints(&self, surface: &Surface, direction: DVec3, rays: u32, random: &mut Random) -> Vec3;
+
+    /// The part of what shines at a hit that is left to a ray into a lobe.
+    fn part_of_lobe(&self, hit: &Hit, ray: &Ray, lobe: &LobeRay) -> f32;
 }
 
 impl DiffuseLight for Illumination {
     fn shown(&self, hit: &Hit, surface: &Surface, _: f64, share: u32, random: &mut Random) -> Vec3 {
         self.radiance(hit, surface, share, random)
+    }
+
+    fn glints(&self, surface: &Surface, direction: DVec3, rays: u32, random: &mut Random) -> Vec3 {
+        self.emitters.glints(&self.optics, surface, direction, rays, random)
+    }
+
+    fn part_of_lobe(&self, hit: &Hit, ray: &Ray, lobe: &LobeRay) -> f32 {
+        self.emitters.part_of_lobe(hit, ray, lobe)
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a surface does to light at one point: glTF's material with its textures read.
 
-use super::reflection::{MIRROR_ALPHA, WIDE_LOBE, dielectric_reflectance};
+use super::reflection::{MIRROR_ALPHA, dielectric_reflectance, ggx_density, ggx_masking, has_wide_lobe};
 use crate::scene::{AlphaMode, Hit, Scene, TextureRef, Triangle};
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 
@@ -89,8 +89,8 @@ impl Surface {
         let dielectric = (ratio * ratio * material.specular).clamp(0.0, 1.0);
         let mut specular = Vec3::splat(dielectric).lerp(base, metallic);
         let mut albedo = base * ((1.0 - metallic) * (1.0 - through));
-        if roughness >= WIDE_LOBE && through == 0.0 {
-            // A wide lobe is given to the diffuse part; the dielectric's white sheen is then part of its base colour.
+        if has_wide_lobe(roughness, metallic) && through == 0.0 {
+            // It is given to the diffuse part; the dielectric's white sheen is then part of its base colour.
             albedo += base * metallic;
             specular = Vec3::ZERO;
         } else {
@@ -142,6 +142,44 @@ impl Surface {
     /// Whether its specular ways are those of a smooth surface.
     pub(crate) fn is_sharp(&self) -> bool {
         self.alpha <= MIRROR_ALPHA
+    }
+
+    /// Whether it has a specular lobe with a width.
+    pub(crate) fn is_glossy(&self) -> bool {
+        !self.unlit && !self.is_sharp() && (self.is_specular() || self.transmission.max_element() > 0.0)
+    }
+
+    /// Part of the light that its specular reflection takes, at a cosine of incidence on the micro-normal.
+    pub(crate) fn reflectance(&self, cosine: f64) -> Vec3 {
+        if self.transmission.max_element() <= 0.0 {
+            self.fresnel(cosine)
+        } else if self.volume {
+            Vec3::splat(dielectric_reflectance(cosine, self.ratio()) as f32)
+        } else {
+            Vec3::splat(self.thin_wall_reflectance(cosine))
+        }
+    }
+
+    /// n₁/n₂ for light that goes into what is behind the side that was met.
+    pub(crate) fn ratio(&self) -> f64 {
+        if self.front { 1.0 / self.ior } else { self.ior }
+    }
+
+    /// How densely rays into a glossy surface's lobe lie about a direction [1/sr].
+    pub(crate) fn density(&self, view: DVec3, drawn: DVec3) -> f64 {
+        ggx_density(view, drawn, self.normal, f64::from(self.alpha))
+    }
+
+    /// The specular reflection F·D·G/(4 cosθ cosθ′) of a glossy surface [1/sr], for unit directions to the viewer and to the
+    /// light.
+    pub(crate) fn lobe(&self, view: DVec3, light: DVec3) -> Vec3 {
+        let density = self.density(view, light);
+        if density <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let cosine = light.dot(self.normal);
+        let lobe = density * ggx_masking(cosine, f64::from(self.alpha)) / cosine;
+        self.reflectance((view + light).normalize().dot(view)) * lobe as f32
     }
 
     /// Whether anything of the surface scatters light diffusely.

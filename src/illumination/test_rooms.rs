@@ -9,7 +9,7 @@ pub(crate) fn glass() -> Material {
 }
 
 /// A scene that is put together by hand.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Room {
     pub(crate) scene: Scene,
     instances: u32,

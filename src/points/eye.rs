@@ -7,7 +7,7 @@
 use super::settings::{MirrorDepth, TraceSettings};
 use super::wavefront::{Wavefront, normal_change};
 use crate::illumination::paths::{Ways, inside};
-use crate::illumination::{DiffuseLight, Illumination, Surface};
+use crate::illumination::{DiffuseLight, Illumination, LobeRay, Surface};
 use crate::random::Random;
 use crate::scene::bvh::{Ray, SceneBvh, Sides};
 use crate::scene::{Camera, Projection};
@@ -144,6 +144,8 @@ struct Branch {
     share: u32,
     /// Whether it was reflected or refracted.
     bent: bool,
+    /// The last surface that did so was rough: suns have been seen there as glints, lamps in part.
+    lobe: Option<LobeRay>,
 }
 
 impl<'a> Eye<'a> {
@@ -197,6 +199,7 @@ impl<L: DiffuseLight> Looks<'_, L> {
             group: None,
             share,
             bent: false,
+            lobe: None,
         });
         while let Some(branch) = open.pop() {
             self.step(branch, seen, open, &mut groups, random);
@@ -243,9 +246,13 @@ impl<L: DiffuseLight> Looks<'_, L> {
             push(open, own(weight, past), random);
             branch.weight *= surface.coverage;
         }
-        if surface.is_diffuse() || surface.emission.max_element() > 0.0 {
+        let glossy = surface.is_glossy();
+        let lobe = if glossy { self.rays_into_lobe(&branch, &surface) } else { 1 };
+        let glints = if glossy { self.light.glints(&surface, ray.direction, lobe, random) } else { Vec3::ZERO };
+        if surface.is_diffuse() || (surface.emission + glints).max_element() > 0.0 {
             let shown = self.light.shown(&hit, &surface, footprint, branch.share, random);
-            let radiance = branch.weight * shown;
+            let left = branch.lobe.map_or(1.0, |lobe| self.light.part_of_lobe(&hit, &ray, &lobe));
+            let radiance = branch.weight * (shown - surface.emission * (1.0 - left) + glints);
             let group = branch.group.unwrap_or_else(|| next(groups));
             let depth = self.depth(&branch);
             seen.radiance += radiance;
@@ -255,32 +262,19 @@ impl<L: DiffuseLight> Looks<'_, L> {
         if surface.unlit || !bends || branch.bounces >= self.bounces {
             return;
         }
-        // One look tells how strong the ways are; for a rough surface each ray of its lobe looks again.
-        let mut ways = Ways::new(&surface, ray.direction, random);
-        let strength = (ways.reflectance + ways.transmittance).max_element().min(1.0);
-        if strength <= 0.0 {
-            return;
-        }
-        let lobe = if surface.is_sharp() || branch.group.is_some() {
-            1
-        } else {
-            let most = self.lobe_rays;
-            (most * strength * branch.weight.max_element().min(1.0)).ceil().clamp(1.0, most) as u32
-        };
         let groups: [Option<u16>; 2] = match (branch.group, surface.is_sharp()) {
             (None, false) => [Some(next(groups)), Some(next(groups))],
             (group, _) => [group; 2],
         };
         let change = normal_change(bvh.scene(), &hit);
-        for number in 0..lobe {
-            if number > 0 {
-                ways = Ways::new(&surface, ray.direction, random);
-            }
+        for _ in 0..lobe {
+            let ways = Ways::new(&surface, ray.direction, random);
             let onward = |part: Vec3, direction: DVec3, group: Option<u16>| Branch {
                 bounces: branch.bounces + 1,
                 share: branch.share * lobe,
                 group,
                 bent: true,
+                lobe: glossy.then(|| LobeRay::new(&surface, -ray.direction, direction, lobe)),
                 ..own(branch.weight / lobe as f32 * part, Ray { origin: surface.position, direction })
             };
             let mut mirrored = onward(ways.reflectance, ways.mirrored, groups[0]);
@@ -289,7 +283,8 @@ impl<L: DiffuseLight> Looks<'_, L> {
             }
             push(open, mirrored, random);
             let mut through = onward(ways.transmittance, ways.through, groups[1]);
-            through.bent = branch.bent || surface.volume;
+            // What comes through a rough surface is looked for by rays alone.
+            (through.bent, through.lobe) = if surface.volume { (true, None) } else { (branch.bent, branch.lobe) };
             if let Some(wave) = through.wave.as_mut().filter(|_| surface.volume) {
                 wave.refract(ray.direction, ways.half, ways.ratio, &change);
             }
@@ -297,17 +292,30 @@ impl<L: DiffuseLight> Looks<'_, L> {
         }
     }
 
+    /// How many rays a glossy surface sends into its lobe.
+    fn rays_into_lobe(&self, branch: &Branch, surface: &Surface) -> u32 {
+        if branch.group.is_some() {
+            return 1;
+        }
+        // What the drawn ways bring must not decide how many are drawn: their mean would not be the lobe's.
+        let cosine = branch.ray.direction.dot(surface.normal).abs();
+        let strength = (surface.reflectance(cosine) + surface.transmission).max_element().min(1.0);
+        (self.lobe_rays * strength * branch.weight.max_element().min(1.0)).ceil().clamp(1.0, self.lobe_rays) as u32
+    }
+
     /// Shows what lies beyond the scene to a branch that leaves it by way of mirrors or glass. Straight ahead it is dark: a
     /// hologram has no place for what is infinitely far away.
     fn leave(&self, mut branch: Branch, seen: &mut RaySample, groups: &mut u16) {
         let Some(around) = self.bvh.scene().environment.as_ref().filter(|_| branch.bent) else { return };
-        let radiance = branch.weight * around.radiance(branch.ray.direction);
+        let direction = branch.ray.direction;
+        let radiance =
+            branch.weight * if branch.lobe.is_some() { around.smooth(direction) } else { around.radiance(direction) };
         let group = branch.group.unwrap_or_else(|| next(groups));
         // Its image in a curved mirror or in glass is near; that in a flat one is put as far away as the scene is large.
         let size = self.bvh.size();
         branch.path += size;
         if let Some(wave) = &mut branch.wave {
-            wave.advance(branch.ray.direction, BEYOND * size, -branch.ray.direction);
+            wave.advance(direction, BEYOND * size, -direction);
         }
         let depth = self.depth(&branch).min(branch.path);
         seen.radiance += radiance;

@@ -7,7 +7,7 @@ use crate::illumination::test_rooms::{Room, glass};
 use crate::illumination::{Illumination, IlluminationSettings};
 use crate::progress::Progress;
 use crate::random::Random;
-use crate::scene::{Camera, Environment, Material, Scene, SceneBvh};
+use crate::scene::{Camera, Environment, LightKind, Material, PunctualLight, Scene, SceneBvh};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -140,6 +140,80 @@ fn in_an_environment_matte_chrome_glass_and_gloss_agree_with_plain_paths() {
     ];
     // Light of the environment is linear between the vertices of the mesh: at the foot of a body that is some per cent off.
     agrees(&room, &camera, &squares, 300_000, 2e-2);
+}
+
+/// glTF's microfacet reflection of a metal times the cosine of incidence, written anew (appendix B of its specification).
+fn microfacets(view: DVec3, light: DVec3, alpha: f64, f0: f64) -> f64 {
+    let half = (view + light).normalize();
+    let masking = |cos: f64| 2.0 * cos / (cos + (alpha * alpha + (1.0 - alpha * alpha) * cos * cos).sqrt());
+    let d = alpha * alpha / (std::f64::consts::PI * ((alpha * alpha - 1.0) * half.z * half.z + 1.0).powi(2));
+    let fresnel = f0 + (1.0 - f0) * (1.0 - half.dot(view)).powi(5);
+    fresnel * d * masking(view.z) * masking(light.z) / (4.0 * view.z)
+}
+
+#[test]
+fn rough_metal_shows_all_of_its_lobe_and_the_glint_of_a_light_without_size() {
+    let f0 = 0.8;
+    let view = DVec3::new(0.6, 0.0, 0.8);
+    let towards = DVec3::new(-0.3, 0.4, 0.75f64.sqrt());
+    for roughness in [0.3f32, 0.6, 0.9] {
+        let alpha = f64::from(roughness * roughness);
+        let mut room = Room::default();
+        let metal = room.material(Material { roughness, ..Material::mirror(Vec3::splat(f0 as f32)) });
+        room.quad(DVec3::new(-9.0, -9.0, 0.0), DVec3::X * 18.0, DVec3::Y * 18.0, metal);
+        let seen = |scene: &Scene| {
+            let bvh = SceneBvh::new(scene.clone());
+            let light = Illumination::new(bvh, IlluminationSettings::default(), &Progress::new()).unwrap();
+            let settings = TraceSettings { width: 10, height: 10, ..TraceSettings::default() };
+            let camera = Camera::looking_at(view * 3.0, DVec3::ZERO, 0.01);
+            let eye = Eye::new(&light, &camera, &settings);
+            let look = |i: u64| f64::from(eye.look(5.0, 5.0, 1, &mut Random::new(5, i)).radiance.x);
+            (0..4000).into_par_iter().map(look).sum::<f64>() / 4000.0
+        };
+        // Under an even sky: the integral over the lobe, by midpoints in cosine and azimuth.
+        let n = 1200;
+        let mut whole = 0.0;
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let cos = (f64::from(i) + 0.5) / f64::from(n);
+            let (s, c) = (std::f64::consts::TAU * (f64::from(j) + 0.5) / f64::from(n)).sin_cos();
+            let sin = (1.0 - cos * cos).sqrt();
+            whole += microfacets(view, DVec3::new(sin * c, sin * s, cos), alpha, f0);
+        }
+        whole *= std::f64::consts::TAU / f64::from(n * n);
+        let mut under_sky = room.scene.clone();
+        under_sky.environment = Some(Arc::new(Environment::new(8, 4, vec![Vec3::ONE; 32], 0.0).unwrap()));
+        let found = seen(&under_sky);
+        assert!((found / whole - 1.0).abs() < 4e-3, "roughness {roughness}: {found}, not {whole}");
+        // In the light of a sun of 2 W/m² no ray of the lobe meets it.
+        room.scene.lights.push(PunctualLight {
+            kind: LightKind::Directional,
+            position: Vec3::ZERO,
+            direction: -towards.as_vec3(),
+            intensity: Vec3::splat(2.0),
+            range: f32::INFINITY,
+        });
+        let (found, glint) = (seen(&room.scene), 2.0 * microfacets(view, towards, alpha, f0));
+        assert!((found / glint - 1.0).abs() < 1e-3, "roughness {roughness}: {found}, not {glint}");
+        // Lamps, small and large: the integral over their surface.
+        room.scene.lights.clear();
+        let (u, v) = towards.any_orthonormal_pair();
+        let (u, v) = if u.cross(v).dot(towards) < 0.0 { (u, v) } else { (v, u) };
+        for size in [0.05, 0.8] {
+            let mut room = room.clone();
+            let lamp = room.material(Material::emitter(Vec3::splat(3.0)));
+            let corner = towards * 1.5 - (u + v) * (0.5 * size);
+            room.quad(corner, u * size, v * size, lamp);
+            let (n, mut whole) = (400, 0.0);
+            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                let [a, b] = [i, j].map(|k| size * (f64::from(k) + 0.5) / f64::from(n));
+                let span = corner + u * a + v * b;
+                let solid = (size / f64::from(n)).powi(2) * towards.dot(span) / span.length().powi(3);
+                whole += 3.0 * microfacets(view, span.normalize(), alpha, f0) * solid;
+            }
+            let found = seen(&room.scene);
+            assert!((found / whole - 1.0).abs() < 1e-2, "roughness {roughness}, lamp of {size}: {found}, not {whole}");
+        }
+    }
 }
 
 #[test]
