@@ -10,7 +10,7 @@ use super::load::{self, Input, Points};
 use super::report::{Report, seconds};
 use super::resolve;
 use super::sequence::{self, Sequence};
-use super::shown::{Shown, usual};
+use super::shown::{Shown, Views, usual};
 use super::steps::write_traced;
 use crate::encode::Encoding;
 use crate::field::npy::Content;
@@ -172,7 +172,7 @@ fn frames(
             let light = eye::light_field(&eye::Content::Views(file), setup, &settings, progress, report)?;
             let frames = maker.eye_frames(&light, None, out, report)?;
             let content = Content { depth: Some(light.depth), ..Content::default() };
-            Ok(Shown { views: Some((light, viewer)), ..Shown::new(frames, content) })
+            Ok(Shown { views: Views::Found(light, viewer), ..Shown::new(frames, content) })
         }
         _ => {
             let reading = resolve::reading(&args.map, &args.placement);
@@ -183,20 +183,18 @@ fn frames(
                 report.value("focus", &scene.view.focus);
             }
             let viewer = settings.viewer;
-            // A frame for a monitor is made without pictures of it.
-            let is_view = matches!(settings.encode.encoding, Some(Encoding::View(_)));
-            let fits = Retina::of(&viewer, &setup.grid, setup.wavelength).is_ok();
-            let seen = is_view || (args.monitor.is_none() && fits);
-            let content = eye::Content::Points(&points);
-            let light = seen.then(|| eye::light_field(&content, setup, settings, progress, report)).transpose()?;
-            let frames = match &light {
-                Some(light) if is_view => maker.eye_frames(light, Some(&points), out, report)?,
-                _ => maker.frames(&points, out, report)?,
+            let (frames, views) = if matches!(settings.encode.encoding, Some(Encoding::View(_))) {
+                let content = eye::Content::Points(&points);
+                let light = eye::light_field(&content, setup, settings, progress, report)?;
+                (maker.eye_frames(&light, Some(&points), out, report)?, Views::Found(light, viewer))
+            } else {
+                // A frame for a monitor is made without pictures of it.
+                let judged = args.monitor.is_none() && Retina::of(&viewer, &setup.grid, setup.wavelength).is_ok();
+                (maker.frames(&points, out, report)?, if judged { Views::Wanted(viewer) } else { Views::Unknown })
             };
             if frames.iter().all(Option::is_none) {
                 return Err(Error::input(&args.input, "has no light for any of the lasers"));
             }
-            let views = light.map(|light| (light, viewer));
             Ok(Shown { frames, content: points.content(), points: Some(points), views })
         }
     }

@@ -23,13 +23,22 @@ pub(super) struct Shown {
     pub(super) frames: Vec<Option<Frame>>,
     pub(super) content: Content,
     pub(super) points: Option<Points>,
-    /// What an eye should see of it.
-    pub(super) views: Option<(LightField, Viewer)>,
+    pub(super) views: Views,
+}
+
+/// What an eye should see.
+pub(super) enum Views {
+    /// Nobody knows, or asks.
+    Unknown,
+    /// What the frames were made of.
+    Found(LightField, Viewer),
+    /// What the frames, made without it, are judged by: found once they are there.
+    Wanted(Viewer),
 }
 
 impl Shown {
     pub(super) fn new(frames: Vec<Option<Frame>>, content: Content) -> Self {
-        Self { frames, content, points: None, views: None }
+        Self { frames, content, points: None, views: Views::Unknown }
     }
 
     /// The pictures: as the viewer sees it, where it is known what should be seen, and with all of the panel's light.
@@ -52,7 +61,15 @@ impl Shown {
             gallery.write(&args.output)?;
             report_gallery(&gallery, scene, frames.len(), looked, report);
         }
-        let Some((light, viewer)) = &self.views else { return Ok(()) };
+        let found;
+        let (light, viewer) = match (&self.views, &self.points) {
+            (Views::Found(light, viewer), _) => (light, viewer),
+            (Views::Wanted(viewer), Some(points)) => {
+                found = eye::light_field(&eye::Content::Points(points), setup, settings, progress, report)?;
+                (&found, viewer)
+            }
+            _ => return Ok(()),
+        };
         let (bench, channel, sweeps) = (&settings.bench, settings.channel, args.sweeps);
         let look = eye::Look { light, scene, viewer, channel, bench, sweeps };
         eye::look(&frames, setup, &look, &args.output, progress, report)

@@ -19,6 +19,7 @@ pub use num_complex::{Complex, Complex32, Complex64};
 pub(crate) use phasor::{angle, phasor};
 
 use crate::error::{Error, Result};
+use rayon::prelude::*;
 
 /// Complex amplitude of a monochromatic scalar wave, sampled on the plane of its grid.
 ///
@@ -52,11 +53,14 @@ impl Field<f32> {
     }
     /// Σ|u|², without the pixel's area: what a unitary step keeps.
     pub fn energy(&self) -> f64 {
-        self.samples.iter().map(|u| f64::from(u.norm_sqr())).sum()
+        // Row by row, so that the sum is the same for any number of threads.
+        let row = |row: &[Complex32]| -> f64 { row.iter().map(|u| f64::from(u.norm_sqr())).sum() };
+        let rows = self.samples.par_chunks(self.grid.width.max(1)).map(row);
+        rows.collect::<Vec<_>>().into_iter().sum()
     }
     /// |u|² at each sample.
     pub fn intensity(&self) -> Vec<f32> {
-        self.samples.iter().map(Complex::norm_sqr).collect()
+        self.samples.par_iter().map(Complex::norm_sqr).collect()
     }
     /// The same samples in double precision.
     pub fn to_f64(&self) -> Field<f64> {

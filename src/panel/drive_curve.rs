@@ -14,6 +14,15 @@ pub enum Modulation {
     Amplitude,
 }
 
+/// Parts of a turn in which the search for a phase begins: more than most panels have levels.
+const BINS: usize = 1024;
+
+/// How many of the sorted phases lie below the beginning of each part of a turn.
+fn below(sorted: &[(f64, u16)]) -> Vec<u32> {
+    let begin = |bin: usize| TAU * bin as f64 / BINS as f64;
+    (0..BINS).map(|bin| sorted.partition_point(|v| v.0 < begin(bin)) as u32).collect()
+}
+
 /// The first index at which a sequence stops being strictly monotone.
 pub(crate) fn non_monotone(values: &[f64]) -> Option<usize> {
     let rising = values.len() < 2 || values[1] > values[0];
@@ -28,6 +37,8 @@ pub struct DriveCurve {
     values: Vec<f64>,
     /// Usable levels by rising value (phases wrapped to [0, 2π)).
     sorted: Vec<(f64, u16)>,
+    /// For each of [`BINS`] equal parts of a turn how many usable phases lie below its beginning; none for amplitudes.
+    below: Vec<u32>,
     /// Distance within which a reachable wish finds its level: the widest step between neighbours, gap excluded.
     step: f64,
 }
@@ -52,7 +63,7 @@ impl DriveCurve {
         steps.sort_by(f64::total_cmp);
         // The widest step may be the gap that a range below one turn leaves; the next one is a step of the curve.
         let step = if steps.len() > 1 { steps[steps.len() - 2] } else { TAU };
-        Self { modulation: Modulation::Phase, values, sorted, step }
+        Self { modulation: Modulation::Phase, values, below: below(&sorted), sorted, step }
     }
 
     /// From the phases of all levels [rad] and a controller's table: only the table's levels are used. Its phases are counted
@@ -66,7 +77,7 @@ impl DriveCurve {
         let shown = |level: u16, phase: f64| (values[usize::from(level)] - phase + PI).rem_euclid(TAU) - PI;
         sorted.retain(|&(phase, level)| shown(level, phase).abs() < 1e-9);
         let step = TAU / output.len() as f64;
-        Self { modulation: Modulation::Phase, values, sorted, step }
+        Self { modulation: Modulation::Phase, values, below: below(&sorted), sorted, step }
     }
 
     /// From amplitude transmittances, one a level.
@@ -74,7 +85,7 @@ impl DriveCurve {
         let mut sorted: Vec<(f64, u16)> = values.iter().enumerate().map(|(l, &v)| (v, l as u16)).collect();
         sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let step = sorted.windows(2).map(|w| w[1].0 - w[0].0).fold(0.0, f64::max);
-        Self { modulation: Modulation::Amplitude, values, sorted, step }
+        Self { modulation: Modulation::Amplitude, values, below: Vec::new(), sorted, step }
     }
 
     /// What the levels modulate.
@@ -118,7 +129,12 @@ impl DriveCurve {
         match self.modulation {
             Modulation::Phase => {
                 let wish = wish.rem_euclid(TAU);
-                let at = self.sorted.partition_point(|v| v.0 < wish);
+                // As `partition_point` says, from a place that is at most one bin before it; the bin itself may be rounded up.
+                let bin = ((wish * (BINS as f64 / TAU)) as usize).clamp(1, BINS) - 1;
+                let mut at = self.below[bin] as usize;
+                while at < self.sorted.len() && self.sorted[at].0 < wish {
+                    at += 1;
+                }
                 let above = self.sorted.get(at).map_or((self.sorted[0].0 + TAU, self.sorted[0].1), |v| *v);
                 let below = match at {
                     0 => {

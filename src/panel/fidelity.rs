@@ -7,10 +7,11 @@ use super::profile::PanelProfile;
 use super::simulated::illuminate;
 use super::wavefront::Wavefront;
 use crate::error::Result;
-use crate::field::{Complex32, Complex64, Field};
+use crate::field::{Complex32, Complex64, Field, phasor};
 use crate::progress::Progress;
 use crate::propagation;
 use rayon::prelude::*;
+use std::f64::consts::TAU;
 
 /// A field behind a panel against the wanted one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +63,7 @@ fn shown(frame: &Frame, correction: Option<&Wavefront>, record: &EncodingRecord)
             Modulation::Amplitude => Complex32::new(value, 0.0),
             Modulation::Phase => {
                 let phase = f64::from(value) - correction.map_or(0.0, |c| f64::from(c.phase[i]));
-                Complex32::new(phase.cos() as f32, phase.sin() as f32)
+                phasor((phase * (1.0 / TAU)) as f32)
             }
         })
         .collect();
@@ -76,12 +77,15 @@ fn compare(wanted: &Field, seen: Field, record: &EncodingRecord, progress: &Prog
         Some(aperture) => propagation::limit(&seen, aperture, progress)?.0,
         None => seen,
     };
-    let product: Complex64 = wanted
-        .samples
-        .iter()
-        .zip(&seen.samples)
-        .map(|(u, g)| Complex64::new(u.re.into(), -f64::from(u.im)) * Complex64::new(g.re.into(), g.im.into()))
-        .sum();
+    let row = wanted.grid.width;
+    let overlap = |u: &[Complex32], g: &[Complex32]| -> Complex64 {
+        let each = u.iter().zip(g);
+        each.map(|(u, g)| Complex64::new(u.re.into(), -f64::from(u.im)) * Complex64::new(g.re.into(), g.im.into()))
+            .sum()
+    };
+    // Row by row, so that the sum is the same for any number of threads.
+    let rows = wanted.samples.par_chunks(row).zip(seen.samples.par_chunks(row));
+    let product: Complex64 = rows.map(|(u, g)| overlap(u, g)).collect::<Vec<_>>().into_iter().sum();
     let (uu, gg, count) = (wanted.energy(), seen.energy(), seen.samples.len() as f64);
     Ok(Fidelity {
         efficiency: product.norm_sqr() / (uu * count),
