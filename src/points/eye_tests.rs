@@ -168,7 +168,7 @@ fn rough_metal_shows_all_of_its_lobe_and_the_glint_of_a_light_without_size() {
             let camera = Camera::looking_at(view * 3.0, DVec3::ZERO, 0.01);
             let eye = Eye::new(&light, &camera, &settings);
             let look = |i: u64| f64::from(eye.look(5.0, 5.0, 1, &mut Random::new(5, i)).radiance.x);
-            (0..4000).into_par_iter().map(look).sum::<f64>() / 4000.0
+            (0..20_000).into_par_iter().map(look).sum::<f64>() / 20_000.0
         };
         // Under an even sky: the integral over the lobe, by midpoints in cosine and azimuth.
         let n = 1200;
@@ -183,7 +183,7 @@ fn rough_metal_shows_all_of_its_lobe_and_the_glint_of_a_light_without_size() {
         let mut under_sky = room.scene.clone();
         under_sky.environment = Some(Arc::new(Environment::new(8, 4, vec![Vec3::ONE; 32], 0.0).unwrap()));
         let found = seen(&under_sky);
-        assert!((found / whole - 1.0).abs() < 4e-3, "roughness {roughness}: {found}, not {whole}");
+        assert!((found / whole - 1.0).abs() < 6e-3, "roughness {roughness}: {found}, not {whole}");
         // In the light of a sun of 2 W/m² no ray of the lobe meets it.
         room.scene.lights.push(PunctualLight {
             kind: LightKind::Directional,
