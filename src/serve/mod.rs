@@ -90,6 +90,8 @@ pub struct ServedPanel {
     pub design_wavelength: f64,
     /// Time from a frame's being presented until the panel has settled on it [s].
     pub settle_time: f64,
+    /// What each level does at the wavelength in use: phase [rad], or transmittance; the mean, where pixels differ.
+    pub curve: Vec<f64>,
 }
 
 /// The socket of the local protocol on which clients look for the panel of that name; none where the system has no such

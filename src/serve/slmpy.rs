@@ -58,6 +58,7 @@ mod tests {
             wavelength: 532e-9,
             design_wavelength: 532e-9,
             settle_time: 0.0,
+            curve: vec![0.0, 0.5],
         }
     }
 
