@@ -26,6 +26,7 @@ fn panel() -> ServedPanel {
         wavelength: 532e-9,
         design_wavelength: 532e-9,
         settle_time: 0.0,
+        curve: vec![0.0; 256],
     }
 }
 
