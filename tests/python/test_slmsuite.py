@@ -250,3 +250,26 @@ def test_a_bench_that_cannot_be_served_is_refused(bench: Any) -> None:
             serve_bench(*arguments, port=0)
     with pytest.raises(hd.ParameterError, match="there is no `best`"):
         serve_bench(slm, port=0, levels="best")
+
+
+def test_a_users_script_is_clean_under_mypy_strict_and_runs() -> None:
+    from test_types import HERE, mypy
+
+    assert mypy(HERE / "user_bench.py") == ""
+    import user_bench
+
+    assert user_bench.picture(np.zeros((120, 160))).shape == (48, 64)
+
+
+def test_everything_public_is_documented() -> None:
+    import inspect
+
+    import holodrive.slmsuite as module
+
+    for name in module.__all__:
+        thing = getattr(module, name)
+        text = inspect.getdoc(thing) or ""
+        taken = set(inspect.signature(thing).parameters) - {"kwargs", "hardware"} if name != "Remote" else set()
+        assert len(text) > 100 and not [one for one in taken if one not in text], (name, taken)
+        own = [value for key, value in vars(thing).items() if not key.startswith("_")] if inspect.isclass(thing) else []
+        assert all(len(inspect.getdoc(value) or "") > 8 for value in own if callable(value))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from typing import Any
 
@@ -14,6 +15,7 @@ import matplotlib  # noqa: E402
 
 matplotlib.use("Agg")
 from holodrive.slmsuite import Holodrive, SimulatedCamera  # noqa: E402
+from conftest import ROOT  # noqa: E402
 from slmsuite.hardware.cameraslms import FourierSLM  # noqa: E402
 from slmsuite.holography.algorithms import FeedbackHologram, SpotHologram  # noqa: E402
 
@@ -251,7 +253,8 @@ def test_feedback_makes_spots_even(bench: Any) -> None:
     hologram.optimize("WGS-Kim", maxiter=25, verbose=False, feedback="experimental_spot")
     slm.set_phase(hologram.get_phase())
     assert before < 0.96
-    assert evenness(camera.get_image()) > 0.98 and evenness(camera.render()) > 0.98
+    # Eight photos: one's own noise is 1 %.
+    assert evenness(camera.get_image(averaging=8)) > 0.98 and evenness(camera.render()) > 0.98
     # The light itself, without the bench's own transform.
     near = [(i + round(a), j + round(b)) for a, b in spots.T for j in range(-6, 7) for i in range(-6, 7)]
     slm_x, slm_y = over(slm)
@@ -297,7 +300,7 @@ def test_wavefront_calibration_finds_what_is_hidden() -> None:
     slm = panel()
     x, y = over(slm)
     r2 = x**2 + y**2
-    # Defocus, astigmatism and coma: 0.2 waves rms; a Gaussian beam.
+    # Defocus, astigmatism and coma: 0.16 waves rms over a Gaussian beam.
     hidden = 2 * (2 * r2 - 1) + 1.5 * 2 * x * y + 1.2 * (3 * r2 - 2) * x
     amplitude = np.exp(-r2 / 1.2)
     camera = SimulatedCamera(
@@ -332,8 +335,6 @@ def test_wavefront_calibration_finds_what_is_hidden() -> None:
 def test_a_full_panel_is_photographed_quickly_and_right() -> None:
     slm = panel(1920, 1080)
     camera = SimulatedCamera(slm, (640, 512), focal_length="200mm", rotation=0.03, offset=(300, 260))
-    bench = calibrated(camera, slm, array_shape=(12, 10), maxiter=5)
-    assert misplaced(bench, camera) < 0.2
     slm.set_phase(np.random.default_rng(1).uniform(0, 6.28, slm.shape))
     start = time.perf_counter()
     seen = camera.render()
@@ -342,3 +343,18 @@ def test_a_full_panel_is_photographed_quickly_and_right() -> None:
     pixels = [(i, j) for i in (0, 299, 639) for j in (0, 260, 511)]
     wanted = by_definition(slm, camera, pixels)
     assert np.abs(np.sqrt(seen[[j for _, j in pixels], [i for i, _ in pixels]]) - np.sqrt(wanted)).max() < 2e-6
+
+
+def test_the_readmes_bench_is_calibrated() -> None:
+    """1920 × 1080, over the local path."""
+    block = re.search(r"```python slmsuite\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+    assert block
+    # A name of its own: a panel of that name may be served on this machine.
+    code = block[1].replace('"generic", ', '"generic", name="bench of the README", ')
+    names: "dict[str, Any]" = {}
+    np.random.seed(1)
+    exec(compile(code, "README.md", "exec"), names)
+    try:
+        assert misplaced(names["bench"], names["camera"]) < 0.2
+    finally:
+        names["slm"].close()

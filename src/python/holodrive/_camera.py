@@ -53,7 +53,7 @@ class SimulatedCamera(_Camera):  # type: ignore[misc]
     :param black_level: level without light.
     :param seed: of the noise.
     :param fill_factor, dead_space, crosstalk: of the panel, where they are not the profile's.
-    :param subsamples: by default so many that each lies within half a resolution λf/(2·width) of the next, 4 at most.
+    :param subsamples: by default as many as the finest fringes of the light need, 4 at most: 1 where pixels are below λf/(1.6·width).
     :param bitdepth: of a level.
     :param kwargs: further arguments of slmsuite's Camera: name, averaging, hdr, rot, fliplr, flipud, exposure_bounds_s …
     :raises ParameterError: neither or both of focal_length and z are given; an array is of another shape; a number is out of its domain.
@@ -149,10 +149,10 @@ class SimulatedCamera(_Camera):  # type: ignore[misc]
                 raise refused("defocus", "it is for a lens; z says where the plane is")
             source = source * np.exp(-1j * np.pi * behind / (wavelength * distance**2) * (x**2 + y[:, None] ** 2))
         if subsamples is None:
-            steps = np.abs(matrix) @ np.ones(2)
-            needed = steps * 2 * np.array(slm.shape[::-1]) if z is None else steps * 2
-            # A twentieth coarser is as good.
-            subsamples = int(min(max(np.ceil(needed.max() / 1.05), 1), 4))
+            # Intensities through a lens hold frequencies up to the panel's width, on a plane up to a cycle a pixel of its. Of the
+            # highest there is next to nothing: a quarter coarser is as good.
+            widest = 2.0 * np.array(slm.shape[::-1] if z is None else (1, 1))
+            subsamples = int(min(max(np.ceil((widest @ np.abs(matrix)).max() / 1.25), 1), 4))
         self._modulator = Modulator(slm.curve, blur)
         size = (int(resolution[0]), int(resolution[1]))
         self._plane: Union[Lens, FreeSpace]
