@@ -12,10 +12,10 @@
     slm = Holodrive("generic", wavelength="532nm")
     camera = SimulatedCamera(slm, focal_length="200mm", rotation=0.03)
     bench = FourierSLM(camera, slm)
-    bench.fourier_calibrate(array_shape=10, array_pitch=30)
+    bench.fourier_calibrate(array_shape=[12, 10], array_pitch=16, autoexpose=True)
 
-Needs slmsuite 0.5 (``pip install slmsuite``); ``import holodrive`` does not. Lengths are metres, or text with a unit, as everywhere in
-holodrive; what slmsuite names ``…_um`` or ``…_s`` is in micrometres and seconds.
+Needs slmsuite 0.5 (``pip install slmsuite``, or the extra ``holodrive[slmsuite]``); ``import holodrive`` does not. Lengths are metres, or
+text with a unit, as everywhere in holodrive; what slmsuite names ``…_um`` or ``…_s`` is in micrometres and seconds.
 """
 
 from __future__ import annotations
