@@ -262,7 +262,8 @@ fn start_client(shared: &Arc<Shared>, stream: Stream, protocol: Protocol) {
             Protocol::Local => conversation.local(),
         };
         if let Err(why) = ended {
-            conversation.told("connection", &format!("ended: {why}"));
+            let gone = why.kind() == io::ErrorKind::UnexpectedEof;
+            conversation.told("connection", &if gone { "gone".to_owned() } else { format!("ended: {why}") });
         }
         drop(conversation);
         worker.forget(&own);
