@@ -26,6 +26,7 @@ fn panel() -> ServedPanel {
         wavelength: 532e-9,
         design_wavelength: 532e-9,
         settle_time: 0.0,
+        curve: vec![0.0; 256],
     }
 }
 
@@ -188,6 +189,38 @@ fn slmpy_sends_frame_after_frame_in_one_connection() {
     let (server, shown) = running.end();
     assert_eq!(shown, [1, 2, 4].map(|number| levels(&frame(number))));
     assert_eq!(server.counts().refused, 2);
+}
+
+#[test]
+fn each_request_is_a_line_of_the_log() {
+    let folder = tempfile::tempdir().expect("folder");
+    let log = folder.path().join("clients.log");
+    let settings = ServeSettings { log: Some(log.clone()), ..settings(Duration::from_secs(20)) };
+    let server = Server::start(panel(), &settings).expect("server");
+    let (slmsuite, slmpy) = (server.slmsuite().expect("port"), server.slmpy().expect("port"));
+    let panel = Panel::run(server);
+    ask(slmsuite, &request(&frame(1), HEIGHT));
+    ask(slmsuite, &request(&frame(1), HEIGHT + 1));
+    let mut stream = TcpStream::connect(slmpy).expect("connect");
+    let mut said = [0; 3];
+    for bytes in [zlib(&[0; 7]), zlib(&[3; 3 * (WIDTH * HEIGHT) as usize])] {
+        stream.write_all(&(bytes.len() as u32).to_le_bytes()).expect("length");
+        stream.write_all(&bytes).expect("frame");
+        stream.read_exact(&mut said).expect("answer");
+    }
+    // `done`: the frame of three equal colours.
+    assert_eq!(&said, b"don");
+    let own = stream.local_addr().expect("address").to_string();
+    drop(stream);
+    let (server, shown) = panel.end();
+    assert_eq!((shown.len(), server.counts().refused), (2, 2));
+    let text = std::fs::read_to_string(&log).expect("log");
+    let lines: Vec<&str> = text.lines().collect();
+    let found = |words: &[&str]| lines.iter().any(|line| words.iter().all(|word| line.contains(word)));
+    assert!(found(&["Z 127.0.0.1:", " slmsuite frame: shown as frame 1"]), "{text}");
+    assert!(found(&[" slmsuite: refused: ", "shape [25, 32]"]), "{text}");
+    assert!(found(&[&own, " slmpy frame: refused: the frame does not unfold"]), "{text}");
+    assert!(found(&[&own, " slmpy frame: shown as frame 2"]), "{text}");
 }
 
 #[test]

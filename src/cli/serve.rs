@@ -204,6 +204,7 @@ fn settings(args: &ServeArgs, served: &ServedPanel, report: &mut Report) -> Resu
         slmpy,
         local,
         calibrated,
+        log: args.log.clone(),
         settle: Duration::from_secs_f64(if args.settle { served.settle_time.max(0.0) } else { 0.0 }),
         ..ServeSettings::default()
     })

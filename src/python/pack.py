@@ -21,6 +21,8 @@ import zipfile
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
+#: What may be installed with it.
+EXTRAS = ("progress", "slmsuite")
 
 
 def stated(text: str, key: str) -> str:
@@ -75,8 +77,8 @@ def pack(extension: Path, out: Path) -> Path:
         f"License-Expression: {stated(project, 'license')}",
         f"Requires-Python: {stated(project, 'requires-python')}",
         *(f"Requires-Dist: {needed}" for needed in listed(project, "dependencies")),
-        *(f"Requires-Dist: {needed}; extra == 'progress'" for needed in listed(project, "progress")),
-        "Provides-Extra: progress",
+        *(f"Requires-Dist: {needed}; extra == '{extra}'" for extra in EXTRAS for needed in listed(project, extra)),
+        *(f"Provides-Extra: {extra}" for extra in EXTRAS),
         *(f"Classifier: {what}" for what in listed(project, "classifiers")),
     ]
     info = f"{name}-{version}.dist-info"

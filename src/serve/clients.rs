@@ -2,6 +2,7 @@
 
 #[cfg(unix)]
 use super::local::LocalSocket;
+use super::log::Log;
 use super::stream::Stream;
 use super::{FrameRequest, ServedPanel};
 use std::collections::VecDeque;
@@ -18,6 +19,7 @@ pub(super) struct Shared {
     pub(super) patience: Duration,
     pub(super) settle: Duration,
     pub(super) calibrated: bool,
+    pub(super) log: Log,
     /// Room for long requests: of clients over the network, and of local ones.
     pub(super) queues: [Queue; 2],
     pub(super) frames: SyncSender<FrameRequest>,

@@ -4,6 +4,7 @@ use super::clients::{CONNECTIONS, Client, FRAMES, REFUSED, Shared};
 use super::conversation::Conversation;
 #[cfg(unix)]
 use super::local::LocalSocket;
+use super::log::Log;
 use super::stream::Stream;
 use super::{Announcement, FrameRequest, ServeCounts, ServeSettings, ServedPanel};
 use crate::error::{Error, Result};
@@ -47,7 +48,7 @@ impl Server {
     ///
     /// [`Error::Parameter`] when the panel has no pixels or its levels not 1 to 16 bits, or no protocol is to be spoken;
     /// [`Error::Display`] when an address cannot be had; [`Error::Unsupported`] for a local socket where the system has
-    /// none.
+    /// none; [`Error::Io`] when the log cannot be written.
     pub fn start(panel: ServedPanel, settings: &ServeSettings) -> Result<Self> {
         if panel.width == 0 || panel.height == 0 || !(1..=16).contains(&panel.bits) {
             let ServedPanel { width, height, bits, .. } = panel;
@@ -62,6 +63,7 @@ impl Server {
                 "the local socket needs a Unix; give slmsuite's or slmPy's protocol a port instead",
             ));
         }
+        let log = settings.log.as_deref().map(Log::open).transpose()?.unwrap_or_default();
         // The socket first: whoever is refused for it must not have opened ports already.
         #[cfg(unix)]
         let (socket, listener) = settings.local.as_deref().map(LocalSocket::take).transpose()?.unzip();
@@ -71,6 +73,7 @@ impl Server {
             patience: settings.patience,
             settle: settings.settle,
             calibrated: settings.calibrated,
+            log,
             queues: Default::default(),
             frames: sender,
             #[cfg(unix)]
@@ -252,12 +255,16 @@ fn start_client(shared: &Arc<Shared>, stream: Stream, protocol: Protocol) {
         stream.prepare(worker.patience);
         let mut conversation = Conversation::new(&worker, &own, stream);
         // However it ends, it concerns this client only.
-        let _ = match protocol {
+        let ended = match protocol {
             Protocol::Slmsuite => conversation.slmsuite(),
             Protocol::Slmpy => conversation.slmpy(),
             #[cfg(unix)]
             Protocol::Local => conversation.local(),
         };
+        if let Err(why) = ended {
+            let gone = why.kind() == io::ErrorKind::UnexpectedEof;
+            conversation.told("connection", &if gone { "gone".to_owned() } else { format!("ended: {why}") });
+        }
         drop(conversation);
         worker.forget(&own);
     });

@@ -26,6 +26,8 @@ pub(super) struct Conversation<'a> {
     shared: &'a Shared,
     client: &'a Client,
     stream: Stream,
+    /// Its address and number, for the log.
+    who: String,
     /// Whether the connection outlives its frames.
     lasting: bool,
     /// Bytes of it that are held, of the server's budget.
@@ -34,7 +36,28 @@ pub(super) struct Conversation<'a> {
 
 impl<'a> Conversation<'a> {
     pub(super) fn new(shared: &'a Shared, client: &'a Client, stream: Stream) -> Self {
-        Self { shared, client, stream, lasting: true, held: 0 }
+        let who = format!("{} client {}", stream.peer(), client.number);
+        Self { shared, client, stream, who, lasting: true, held: 0 }
+    }
+
+    /// Writes into the log what came of a request.
+    pub(super) fn told(&self, what: &str, came: &str) {
+        self.shared.log.line(&self.who, what, came);
+    }
+
+    /// The same, of a frame or another request.
+    fn told_outcome(&self, what: &str, outcome: &Result<Option<Flip>, String>) {
+        match outcome {
+            Ok(Some(flip)) => self.told(what, &format!("shown as frame {}", flip.number)),
+            Ok(None) => self.told(what, "answered"),
+            Err(why) => self.told(what, &format!("refused: {why}")),
+        }
+    }
+
+    /// Counts a request that cannot be served, and writes why.
+    fn refuse(&self, what: &str, why: &str) {
+        self.shared.count(REFUSED);
+        self.told(what, &format!("refused: {why}"));
     }
 
     /// One line in, one line out.
@@ -45,7 +68,7 @@ impl<'a> Conversation<'a> {
             Ok(line) => line,
             Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Err(error),
             Err(error) => {
-                self.shared.count(REFUSED);
+                self.refuse("slmsuite", &error.to_string());
                 return self.reply(answer(Err(error.to_string())).as_bytes());
             }
         };
@@ -56,9 +79,13 @@ impl<'a> Conversation<'a> {
             Ok(Command::Ping) => Ok(hardware(panel)),
             Ok(Command::Describe) => Ok(description(panel, self.shared.calibrated)),
             Ok(Command::Wait) => Ok(serde_json::Value::Null),
-            Ok(Command::Show(frame)) => self.show(frame).map(|_| serde_json::Value::Null),
+            Ok(Command::Show(frame)) => {
+                let shown = self.show(frame).map(Some);
+                self.told_outcome("slmsuite frame", &shown);
+                shown.map(|_| serde_json::Value::Null)
+            }
             Err(why) => {
-                self.shared.count(REFUSED);
+                self.refuse("slmsuite", &why);
                 Err(why)
             }
         };
@@ -76,7 +103,7 @@ impl<'a> Conversation<'a> {
             self.whole(&mut head[1..], Instant::now())?;
             let length = i32::from_le_bytes(head);
             let Some(length) = usize::try_from(length).ok().filter(|length| (1..=limit).contains(length)) else {
-                self.shared.count(REFUSED);
+                self.refuse("slmpy", "no length of a frame of this panel");
                 return self.reply(slmpy::ERR);
             };
             let mut sent = Vec::new();
@@ -87,7 +114,7 @@ impl<'a> Conversation<'a> {
                 sent.resize((had + CHUNK).min(length), 0);
                 let room = self.wait_for_room(sent.len() - had, limit).map_err(io::Error::other);
                 if let Err(error) = room.and_then(|()| self.whole(&mut sent[had..], start)) {
-                    self.shared.count(REFUSED);
+                    self.refuse("slmpy frame", &error.to_string());
                     let _ = self.reply(slmpy::ERR);
                     return Err(error);
                 }
@@ -95,14 +122,11 @@ impl<'a> Conversation<'a> {
             let read = slmpy::read(&sent, &self.shared.panel);
             drop(sent);
             self.release();
-            let shown = match read {
-                Ok(frame) => self.show(frame).is_ok(),
-                Err(_) => {
-                    self.shared.count(REFUSED);
-                    false
-                }
-            };
-            self.reply(if shown { slmpy::DONE } else { slmpy::ERR })?;
+            let shown =
+                read.inspect_err(|_| _ = self.shared.count(REFUSED)).and_then(|frame| self.show(frame).map(Some));
+            // The protocol's answer has no room for the reason.
+            self.told_outcome("slmpy frame", &shown);
+            self.reply(if shown.is_ok() { slmpy::DONE } else { slmpy::ERR })?;
         }
     }
 
@@ -123,7 +147,7 @@ impl<'a> Conversation<'a> {
             let line = match self.line(local::LINE_LIMIT, Some(first[0])) {
                 Ok(line) => line,
                 Err(error) => {
-                    self.shared.count(REFUSED);
+                    self.refuse("local", &error.to_string());
                     let _ = self.reply(local::refusal(&error.to_string()).as_bytes());
                     return Err(error);
                 }
@@ -142,15 +166,16 @@ impl<'a> Conversation<'a> {
                     frame.map(Some)
                 }
             });
-            let outcome = match frame {
-                Ok(None) => Ok(local::done()),
-                Ok(Some(frame)) => self.show(frame).map(|flip| local::answer(&flip, arrived)),
-                Err(why) => {
-                    self.shared.count(REFUSED);
-                    Err(why)
-                }
+            let outcome = frame.inspect_err(|_| _ = self.shared.count(REFUSED)).and_then(|frame| match frame {
+                None => Ok(None),
+                Some(frame) => self.show(frame).map(Some),
+            });
+            self.told_outcome("local", &outcome);
+            let answer = match outcome {
+                Ok(None) => local::done(),
+                Ok(Some(flip)) => local::answer(&flip, arrived),
+                Err(why) => local::refusal(&why),
             };
-            let answer = outcome.unwrap_or_else(|why| local::refusal(&why));
             self.reply(answer.as_bytes())?;
         }
     }
@@ -258,7 +283,7 @@ impl<'a> Conversation<'a> {
     /// Each client has room for a plain frame of its own. What a request takes beyond that comes out of a budget of requests
     /// up to `limit`, one for each kind of client, in turn.
     fn hold(&mut self, bytes: usize, limit: usize) -> bool {
-        let own = slmpy::frame_limit(&self.shared.panel);
+        let own = slmpy::plain_limit(&self.shared.panel);
         let beyond = |held: usize| held.saturating_sub(own);
         let more = beyond(self.held + bytes) - beyond(self.held);
         if more > 0 {
@@ -295,7 +320,7 @@ impl<'a> Conversation<'a> {
 
     fn release(&mut self) {
         let held = std::mem::take(&mut self.held);
-        let beyond = held.saturating_sub(slmpy::frame_limit(&self.shared.panel));
+        let beyond = held.saturating_sub(slmpy::plain_limit(&self.shared.panel));
         self.shared.queues[usize::from(self.client.is_local)].give_back(self.client.number, beyond);
         *self.client.request.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }

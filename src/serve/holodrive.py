@@ -83,7 +83,8 @@ class SLM:
     :param timeout: longest wait for an answer [s].
 
     Attributes: ``name``; ``shape`` as ``(rows, columns)``; ``bits`` of a level; ``modulation``, "phase" or "amplitude";
-    ``pixel_pitch`` ``(x, y)`` [m]; ``wavelength`` [m]; ``settle_time`` [s] from flip to settled light.
+    ``pixel_pitch`` ``(x, y)`` [m]; ``wavelength`` [m]; ``settle_time`` [s] from flip to settled light;
+    ``curve``, what each level does: phase [rad], or transmittance (None, where the program does not say).
     """
 
     name: str
@@ -93,6 +94,7 @@ class SLM:
     pixel_pitch: Tuple[float, float]
     wavelength: float
     settle_time: float
+    curve: "Optional[np.ndarray[Any, np.dtype[np.float64]]]"
 
     def __init__(
         self,
@@ -123,6 +125,7 @@ class SLM:
             self.pixel_pitch = tuple(about["pixel_pitch"])
             self.wavelength = about["wavelength"]
             self.settle_time = about["settle_time"]
+            self.curve = np.array(about["curve"], np.float64) if "curve" in about else None
             with open(about["buffer"], "r+b") as file:
                 self._map = mmap.mmap(file.fileno(), about["bytes"])
             self._ask({"mapped": True})

@@ -106,7 +106,8 @@ impl Driver {
         }
         let profile = &self.profile;
         // The wavelength at which all levels are one turn: a turn takes fewer of them at a shorter one.
-        let levels_for_2pi = profile.drive_curve(self.wavelength).ok().and_then(|(curve, _)| curve.levels_for_2pi());
+        let curve = profile.drive_curve(self.wavelength)?.0;
+        let levels_for_2pi = curve.levels_for_2pi();
         let part = levels_for_2pi.map_or(1.0, |levels| levels / profile.levels() as f64);
         Ok(ServedPanel {
             name: name.to_owned(),
@@ -118,6 +119,7 @@ impl Driver {
             wavelength: self.wavelength,
             design_wavelength: self.wavelength / part,
             settle_time: profile.settle_time.unwrap_or(0.0),
+            curve: curve.values().to_vec(),
         })
     }
 

@@ -277,6 +277,8 @@ pub(super) fn greeting(panel: &ServedPanel, buffer: &Buffer) -> String {
         "pixel_pitch": panel.pixel_pitch,
         "wavelength": panel.wavelength,
         "settle_time": panel.settle_time,
+        // Seven decimals: a curve of 16 bits stays within the megabyte that clients read as a line.
+        "curve": panel.curve.iter().map(|value| (value * 1e7).round() / 1e7).collect::<Vec<_>>(),
         "buffer": buffer.path.to_string_lossy(),
         "bytes": buffer.bytes,
     }))
@@ -318,6 +320,7 @@ mod tests {
             wavelength: 532e-9,
             design_wavelength: 633e-9,
             settle_time: 0.05,
+            curve: vec![0.0, 0.5],
         }
     }
 

@@ -47,6 +47,7 @@ mod conversation;
 mod keeping;
 #[cfg(unix)]
 mod local;
+mod log;
 mod output;
 mod slmpy;
 mod slmsuite;
@@ -90,6 +91,8 @@ pub struct ServedPanel {
     pub design_wavelength: f64,
     /// Time from a frame's being presented until the panel has settled on it [s].
     pub settle_time: f64,
+    /// What each level does at the wavelength in use: phase [rad], or transmittance; the mean, where pixels differ.
+    pub curve: Vec<f64>,
 }
 
 /// The socket of the local protocol on which clients look for the panel of that name; none where the system has no such
@@ -123,6 +126,8 @@ pub struct ServeSettings {
     pub calibrated: bool,
     /// Time after a frame's flip at which it is answered: none, or the panel's settle time.
     pub settle: Duration,
+    /// File to which a line is added for each request: when, who, what, and what came of it.
+    pub log: Option<PathBuf>,
     /// Most clients connected at once; the longest silent one makes room for one more.
     pub connections: usize,
     /// Longest silence inside a request, and longest time for the panel to show a frame.
@@ -139,6 +144,7 @@ impl Default for ServeSettings {
             local: None,
             calibrated: false,
             settle: Duration::ZERO,
+            log: None,
             connections: 32,
             patience: Duration::from_secs(5),
         }

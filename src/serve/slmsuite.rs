@@ -202,6 +202,7 @@ mod tests {
             wavelength: 532e-9,
             design_wavelength: 633e-9,
             settle_time: 0.05,
+            curve: vec![0.0, 0.5],
         }
     }
 

@@ -26,6 +26,15 @@ impl Stream {
         }
     }
 
+    /// Whose it is: an address, or this machine's.
+    pub(super) fn peer(&self) -> String {
+        match self {
+            Self::Tcp(stream) => stream.peer_addr().map_or_else(|_| "gone".into(), |address| address.to_string()),
+            #[cfg(unix)]
+            Self::Local(_) => "local".into(),
+        }
+    }
+
     /// Ends the connection, whoever is reading from it.
     pub(super) fn shutdown(&self) {
         // One that has ended already needs nothing.

@@ -180,7 +180,7 @@ pub(crate) enum Command {
     /// Runs until Ctrl-C, or Esc on the panel. The first line says where clients come in (with --json: one line of JSON with
     /// the ports that it got); the report comes at the end.
     #[command(
-        after_long_help = "Examples:\n  holodrive serve --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive serve --panel generic --monitor none --slmsuite 0 --json\n  holodrive serve --panel mine.toml --monitor HDMI-1 --local --on-client-gone idle --idle flat.png\n  holodrive serve --write-python holodrive.py"
+        after_long_help = "Examples:\n  holodrive serve --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive serve --panel generic --monitor none --slmsuite 0 --json --log clients.log\n  holodrive serve --panel mine.toml --monitor HDMI-1 --local --on-client-gone idle --idle flat.png\n  holodrive serve --write-python holodrive.py"
     )]
     Serve(ServeArgs),
     /// List the built-in panel profiles, and which of their figures nobody has checked.

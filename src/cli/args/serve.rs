@@ -70,6 +70,9 @@ pub(crate) struct ServeArgs {
     #[cfg(feature = "display")]
     #[arg(hide_short_help = true, help_heading = "Display", long, value_parser = one_of::<Presenter>(), default_value = "auto", value_name = "NAME")]
     pub(crate) present: Presenter,
+    /// Add a line to this file for each request: when, who, what, and what came of it.
+    #[arg(help_heading = "Protocols", long, value_name = "FILE")]
+    pub(crate) log: Option<PathBuf>,
     /// Write the Python module for the local protocol to this file, and serve nothing.
     #[arg(help_heading = "Protocols", long, value_name = "FILE")]
     pub(crate) write_python: Option<PathBuf>,

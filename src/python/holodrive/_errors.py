@@ -17,6 +17,7 @@ __all__ = [
     "ParameterError",
     "UndersampledError",
     "UnsupportedError",
+    "refused",
 ]
 
 _Path = Union[str, "os.PathLike[str]"]
@@ -83,3 +84,10 @@ class FileError(Error, OSError):
 
 class Interrupted(Error, KeyboardInterrupt):
     """The work was asked to stop."""
+
+
+def refused(parameter: str, what: str) -> ParameterError:
+    """An argument's refusal, to be raised."""
+    error = ParameterError(f"{parameter}: {what}")
+    error.parameter = parameter
+    return error

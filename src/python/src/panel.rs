@@ -179,6 +179,24 @@ impl Panel {
         self.setup.profile.fill_factor
     }
 
+    /// Amplitude of the light from the dead space between pixels, against that of the active area.
+    #[getter]
+    fn dead_space(&self) -> f64 {
+        self.setup.profile.dead_space
+    }
+
+    /// Standard deviation of the Gaussian by which the phases of neighbouring pixels blend [pixels].
+    #[getter]
+    fn crosstalk(&self) -> f64 {
+        self.setup.profile.crosstalk
+    }
+
+    /// Time from a frame's being presented until the panel has settled on it [s]; None where the profile does not say.
+    #[getter]
+    fn settle_time(&self) -> Option<f64> {
+        self.setup.profile.settle_time
+    }
+
     /// What a user should know before trusting the profile, one line a fact that nobody has checked.
     #[getter]
     fn warnings(&self) -> Vec<String> {
