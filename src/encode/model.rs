@@ -4,7 +4,7 @@
 use crate::error::{Error, Result};
 use crate::field::{Complex32, Complex64, Grid, angle, phasor, zeroed};
 use crate::panel::simulated::{blurred, illuminate};
-use crate::panel::{DriveCurve, Illumination, Modulation, PanelProfile};
+use crate::panel::{DriveCurve, Illumination, Modulation, PanelProfile, Wavefront};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
@@ -17,10 +17,10 @@ pub(super) struct PanelModel {
     fill: f32,
     /// Standard deviation of the Gaussian that blends neighbouring pixels' phases [pixels].
     crosstalk: f64,
-    /// Light of the dead space, seen along the axis: (1 − F)·d.
+    /// Light that no level changes, seen along the axis: the dead space's (1 − F)·d, and what else comes back unmodulated.
     pub(super) dead: f32,
     /// The wave that falls on each pixel; absent: 1 everywhere.
-    incident: Option<Vec<Complex32>>,
+    pub(super) incident: Option<Vec<Complex32>>,
     /// Ends between which the panel can move, where it has less than a turn.
     pub(super) range: Option<Range>,
 }
@@ -56,13 +56,25 @@ impl PanelModel {
     const BINS: usize = 1 << 14;
 
     pub(super) fn new(profile: &PanelProfile, wavelength: f64, illumination: Illumination) -> Result<Self> {
+        Self::bent(profile, wavelength, illumination, None)
+    }
+
+    /// The same of a panel whose wavefront error is the opposite of this correction: the incident wave has it, so that wishes
+    /// carry the correction themselves, and what comes back unmodulated or runs between pixels does as it does on the panel.
+    pub(super) fn bent(
+        profile: &PanelProfile,
+        wavelength: f64,
+        illumination: Illumination,
+        correction: Option<&Wavefront>,
+    ) -> Result<Self> {
         if profile.modulation() != Modulation::Phase {
             let what = format!("{} modulates amplitude; the iterations here need a phase panel", profile.name);
             return Err(Error::parameter("panel", what));
         }
         let grid = profile.grid()?;
         let curve = profile.drive_curve(wavelength)?.0;
-        let fill = profile.fill_factor;
+        let [kept, lost] = [1.0 - profile.unmodulated, profile.unmodulated].map(f64::sqrt);
+        let fill = profile.fill_factor * kept;
         let shown = (0..Self::BINS)
             .map(|bin| {
                 let wish = (bin as f64 + 0.5) / Self::BINS as f64 * std::f64::consts::TAU;
@@ -72,15 +84,22 @@ impl PanelModel {
                 (phase as f32, Complex32::new(phasor.re as f32, phasor.im as f32))
             })
             .collect();
-        let incident = match illumination {
-            Illumination::Normal => None,
-            other => {
-                let mut wave = vec![Complex32::new(1.0, 0.0); grid.len()];
-                illuminate(&mut wave, grid, wavelength, other)?;
-                Some(wave)
+        let beam = profile.beam_amplitude()?;
+        let incident = if illumination == Illumination::Normal && beam.is_none() && correction.is_none() {
+            None
+        } else {
+            let mut wave = match beam {
+                Some(beam) => beam.iter().map(|&amplitude| Complex32::new(amplitude, 0.0)).collect(),
+                None => vec![Complex32::new(1.0, 0.0); grid.len()],
+            };
+            illuminate(&mut wave, grid, wavelength, illumination)?;
+            if let Some(correction) = correction {
+                correction.check(grid.width, grid.height, wavelength)?;
+                wave.par_iter_mut().zip(&correction.phase).for_each(|(u, phase)| *u *= phasor(-phase * (1.0 / TAU)));
             }
+            Some(wave)
         };
-        let dead = ((1.0 - fill) * profile.dead_space) as f32;
+        let dead = ((1.0 - profile.fill_factor) * profile.dead_space * kept + lost) as f32;
         let (fill, crosstalk) = (fill as f32, profile.crosstalk);
         Ok(Self { grid, shown, fill, crosstalk, dead, incident, range: range(&curve) })
     }
@@ -179,4 +198,39 @@ fn range(curve: &DriveCurve) -> Option<Range> {
     let step = span / (curve.levels().max(2) - 1) as f64;
     let low = curve.values().iter().fold(f64::INFINITY, |low, &v| low.min(v));
     (std::f64::consts::TAU - span > 8.0 * step).then_some(Range { low: low as f32, high: (low + span) as f32 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::{npy, relative_error};
+    use crate::panel::{Faults, Pattern, PhasePattern, Simulation, drive, simulate};
+    use crate::progress::Progress;
+    use crate::random::Random;
+
+    /// What the encoder counts on is what the simulated panel shows: beam, unmodulated light, dead space, crosstalk and bend.
+    #[test]
+    fn the_light_of_a_bent_panel_in_its_beam_is_the_simulated_panels() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("beam.npy");
+        let (width, height) = (24, 16);
+        let beam: Vec<f32> = (0..width * height).map(|i| (-1e-3 * (i as f32 - 150.0).powi(2) / 300.0).exp()).collect();
+        npy::write_intensity(&path, width, height, &beam).expect("write");
+        let mut profile = PanelProfile::phase(width, height, 8e-6, 8, 532e-9).expect("profile");
+        (profile.fill_factor, profile.dead_space, profile.crosstalk) = (0.9, 0.7, 0.4);
+        (profile.unmodulated, profile.beam) = (0.08, Some(path));
+        let bend: Vec<f32> = (0..width * height).map(|i| 0.02 * i as f32).collect();
+        let error = Wavefront::new("bend", width, height, Some(532e-9), bend).expect("wavefront");
+        let correction = error.clone().conjugate();
+        let model = PanelModel::bent(&profile, 532e-9, Illumination::Normal, Some(&correction)).expect("model");
+        let mut random = Random::new(1, 2);
+        let wishes: Vec<f32> = (0..width * height).map(|_| random.phase() as f32).collect();
+        let pattern = PhasePattern::new(model.grid, 532e-9, wishes.clone()).expect("pattern");
+        let frame = drive(&Pattern::Phase(pattern), None, &profile).expect("frame").frame;
+        let faults = Faults { wavefront_error: Some(error), ..Faults::default() };
+        let shown = simulate(&frame, &Simulation { faults, ..Simulation::default() }, &Progress::new()).expect("light");
+        let off = relative_error(&model.light(&wishes).total, &shown.samples);
+        assert!(off < 1e-3, "{off}");
+        assert!(relative_error(&model.blended(&wishes).expect("blends"), &shown.samples) < 1e-3);
+    }
 }

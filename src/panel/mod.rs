@@ -22,6 +22,7 @@
 //!
 //! What has been done stands in the frame's metadata ([`frame::Applied`]), so that nothing is done twice.
 
+mod beam;
 mod bounds;
 pub mod drive;
 mod drive_curve;

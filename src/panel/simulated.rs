@@ -120,6 +120,16 @@ pub fn simulate(frame: &Frame, settings: &Simulation, progress: &Progress) -> Re
     progress.check()?;
     let (pitch_x, pitch_y) = (grid.pitch_x / n as f64, grid.pitch_y / n as f64);
     let grid = Grid::new(grid.width * n, grid.height * n, pitch_x, pitch_y)?;
+    if profile.unmodulated > 0.0 {
+        let [kept, lost] = [1.0 - profile.unmodulated, profile.unmodulated].map(|share| share.sqrt() as f32);
+        samples.par_iter_mut().for_each(|u| *u = *u * kept + lost);
+    }
+    if let Some(beam) = profile.beam_amplitude()? {
+        samples.par_chunks_mut(grid.width).enumerate().for_each(|(row, samples)| {
+            let beam = &beam[row / n * profile.width..][..profile.width];
+            samples.iter_mut().enumerate().for_each(|(column, u)| *u *= beam[column / n]);
+        });
+    }
     let illumination =
         settings.illumination.or(frame.metadata.encoding.as_ref().map(|e| e.illumination)).unwrap_or_default();
     if let Some(error) = &faults.wavefront_error {
