@@ -88,7 +88,7 @@ fn monomials(m: usize) -> [f64; CURVE + 1] {
     std::array::from_fn(|k| match k {
         0 => 0.0,
         k if k > m => 0.0,
-        k => choose(m, k) * choose(m + k, k) * if (m + k) % 2 == 0 { 1.0 } else { -1.0 },
+        k => choose(m, k) * choose(m + k, k) * if (m + k).is_multiple_of(2) { 1.0 } else { -1.0 },
     })
 }
 

@@ -69,7 +69,7 @@ pub(super) fn level_shapes(degree: usize, levels: usize) -> Vec<Vec<f64>> {
     (0..levels)
         .map(|level| {
             let p = legendre(degree, 2.0 * level as f64 / (levels.max(2) - 1) as f64 - 1.0);
-            (1..=degree).map(|m| p[m] - if m % 2 == 0 { 1.0 } else { -1.0 }).collect()
+            (1..=degree).map(|m| p[m] - if m.is_multiple_of(2) { 1.0 } else { -1.0 }).collect()
         })
         .collect()
 }

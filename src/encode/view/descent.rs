@@ -277,7 +277,7 @@ impl<S: Sight> Problem<'_, S> {
                 // Slopes by the phases that the panel shows. Those by the wishes are these blended once more; without that
                 // the way still leads down, since a Gaussian has no negative part in its spectrum, and what crosstalk
                 // weakens moves as fast as all else: 1.6π with a crosstalk of 0.3 pixels comes to 41.2 dB of Cornell's room
-                // where blended slopes come to 40.5, in 50 steps.
+                // where blended slopes come to 40.5, in 50 steps (of a panel that showed each pixel's middle phase all over it).
                 let light = &light[row * width..][..width];
                 cells.zip(light).enumerate().for_each(|(column, ((((wish, first), second), p), u))| {
                     let still = incident.map_or(one, |wave| wave[row * width + column]) * self.model.dead;
