@@ -150,15 +150,14 @@ mod tests {
         // Derivatives against differences.
         let at = [500.0, 100.0];
         let (_, slopes) = truth.with_slopes(at);
-        for i in 0..MAPPING {
-            let moved = |d: f64| {
-                let mut m = truth.clone();
-                m.values[i] += d;
-                m.frequency(at)
-            };
-            for axis in 0..2 {
-                let difference = (moved(1e-6)[axis] - moved(-1e-6)[axis]) / 2e-6;
-                assert!((difference - slopes[axis][i]).abs() < 1e-6, "{i} {axis}");
+        for (axis, slopes) in slopes.iter().enumerate() {
+            for (i, slope) in slopes.iter().enumerate() {
+                let moved = |d: f64| {
+                    let mut m = truth.clone();
+                    m.values[i] += d;
+                    m.frequency(at)[axis]
+                };
+                assert!(((moved(1e-6) - moved(-1e-6)) / 2e-6 - slope).abs() < 1e-6, "{i} {axis}");
             }
         }
         assert!(truth.fitted(&pairs[..2]).is_err());
