@@ -73,6 +73,7 @@
 //! | term | what it is |
 //! |---|---|
 //! | amplitude, phase | modulus and argument of a wave's complex field; *intensity* is the modulus squared |
+//! | beam | the laser's light on the panel's pixels, brighter in the middle ([`panel::PanelProfile::beam_amplitude`]) |
 //! | bench | the simulated panel with its faults, and the stop behind it ([`pipeline::Bench`]) |
 //! | blaze | a linear phase that sends the object aside, off the zero order |
 //! | carrier | spatial frequency of the reference wave on the panel |

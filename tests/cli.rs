@@ -365,6 +365,7 @@ fn help_is_short_or_has_examples_and_what_was_meant_is_told() {
         "calibrate",
         "calibrate curve",
         "calibrate flatness",
+        "calibrate camera",
         "calibrate check",
         "bench",
         "bench encodings",
@@ -389,7 +390,7 @@ fn help_is_short_or_has_examples_and_what_was_meant_is_told() {
     }
     refused(f, &["shwo"], "did you mean `show`? (see holodrive --help)");
     refused(f, &["calibrate", "nonsense"], "(see holodrive calibrate --help)");
-    refused(f, &["calibrate"], "a command is needed: curve, flatness, check (see holodrive calibrate --help)");
+    refused(f, &["calibrate"], "a command is needed: curve, flatness, camera, check (see holodrive calibrate --help)");
     refused(f, &["bench"], "encodings, views, iterations (see holodrive bench --help)");
     refused(f, &["show", "a.ply", "--wavelenght", "532nm"], "did you mean `--wavelength`? (see holodrive show --help)");
     refused(f, &["compute", "a.ply", "--engine", "plane"], "did you mean `planes`?");

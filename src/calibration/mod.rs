@@ -1,5 +1,5 @@
 //! A panel's curve and wavefront error from what a detector saw: the panel shows known frames, the powers come back as
-//! numbers; and cards whose errors an eye sees.
+//! numbers; all of it and more from a camera's photos ([`camera_frames`], [`calibrate_camera`]); and cards whose errors an eye sees.
 //!
 //! ```
 //! use holodrive::calibration::{Order, fit_curve};
@@ -13,6 +13,7 @@
 //! # Ok::<(), holodrive::Error>(())
 //! ```
 
+mod camera;
 mod cards;
 mod curve;
 mod flatness;
@@ -20,6 +21,10 @@ mod series;
 mod sweep;
 pub mod zernike;
 
+pub use camera::{
+    CameraBench, CameraFit, CameraPhoto, CameraReport, MAPPING, Mapping, RANDOM, calibrate_camera, camera_frames,
+    camera_photo_file, photo_name,
+};
 pub use cards::{Card, card_frames, cards};
 pub use curve::{CurveFit, CurveReport, MeasuredCurve, fit, fit_curve, measure_curve};
 pub use flatness::{Flatness, step_frames, wavefront_from_files, wavefront_from_steps, write_correction};

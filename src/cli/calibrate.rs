@@ -1,20 +1,19 @@
 //! `calibrate`: frames to show, and what the measured numbers say of the panel.
 
-use super::args::{CalibrateCommand, CheckArgs, CurveArgs, FlatnessArgs, PanelArgs, ShownArgs};
-use super::bar::Bar;
+use super::args::{CalibrateCommand, CheckArgs, CurveArgs, FlatnessArgs};
+use super::given_out::{give_out, phase_panel};
 use super::report::{Report, seconds};
-use super::resolve::{self, told_correction};
+use super::resolve::told_correction;
 use crate::calibration::{
-    Flatness, FrameSeries, Sweep, card_frames, cards, measure_curve, step_frames, wavefront_from_files,
-    write_correction, zernike,
+    Flatness, Sweep, card_frames, cards, measure_curve, step_frames, wavefront_from_files, write_correction, zernike,
 };
-use crate::panel::{Modulation, PanelProfile, Setup};
+use crate::panel::Setup;
 use crate::progress::Progress;
 use crate::units::show_length;
 use crate::{Error, Result};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 pub(super) fn calibrate(command: &CalibrateCommand) -> Result<Report> {
     match command {
@@ -24,60 +23,9 @@ pub(super) fn calibrate(command: &CalibrateCommand) -> Result<Report> {
         },
         CalibrateCommand::Flatness(args) if args.interferograms.is_empty() && args.zernike.is_empty() => steps(args),
         CalibrateCommand::Flatness(args) => flatness(args),
+        CalibrateCommand::Camera(args) => super::calibrate_camera::camera(args),
         CalibrateCommand::Check(args) => check(args),
     }
-}
-
-/// Writes frames into a folder and shows them, one after another.
-fn give_out(
-    series: &FrameSeries,
-    folder: &Path,
-    shown: &ShownArgs,
-    profile: &PanelProfile,
-    report: &mut Report,
-) -> Result<()> {
-    let hold = duration(shown, profile)?;
-    #[cfg(not(feature = "display"))]
-    if shown.monitor.is_some() {
-        return Err(Error::unsupported("this build has no display; build it with the feature `display` (the default)"));
-    }
-    #[cfg(feature = "display")]
-    let screen = shown.monitor.as_deref().map(super::screen::Screen::named).transpose()?;
-    let bar = Bar::new();
-    series.write(folder, &bar.progress)?;
-    report.value("frames", series.count());
-    let line = format!("{} frames and manifest.csv in {}", series.count(), folder.display());
-    report.add("output", folder.display().to_string(), line);
-    #[cfg(feature = "display")]
-    if let Some(screen) = screen {
-        bar.progress.start("", 0);
-        screen.play(series.frames(), hold, &bar.progress, report)?;
-    }
-    #[cfg(not(feature = "display"))]
-    let _ = hold;
-    Ok(())
-}
-
-fn duration(shown: &ShownArgs, profile: &PanelProfile) -> Result<Duration> {
-    if !(shown.hold.is_finite() && (1e-3..1e6).contains(&shown.hold)) {
-        return Err(Error::parameter("hold", format!("{} is not a number of seconds from 0.001 on", shown.hold)));
-    }
-    match profile.settle_time {
-        Some(settle) if settle > shown.hold => {
-            let what = format!("{} s is less than the {settle} s that {} takes to settle", shown.hold, profile.name);
-            Err(Error::parameter("hold", what))
-        }
-        _ => Ok(Duration::from_secs_f64(shown.hold)),
-    }
-}
-
-fn phase_panel(args: &PanelArgs, report: &mut Report) -> Result<Setup> {
-    let found = resolve::setup(args, report)?;
-    if found.profile.modulation() != Modulation::Phase {
-        let what = format!("{} modulates amplitude; curve and flatness are of phase panels", found.profile.name);
-        return Err(Error::parameter("panel", what));
-    }
-    Ok(found)
 }
 
 fn sweep(args: &CurveArgs) -> Result<Report> {

@@ -5,11 +5,13 @@ mod args;
 mod bar;
 mod bench;
 mod calibrate;
+mod calibrate_camera;
 #[cfg(feature = "display")]
 mod controls;
 mod encode;
 mod eye;
 mod field;
+mod given_out;
 mod holograms;
 mod layers;
 mod light;

@@ -2,9 +2,10 @@
 //! crosstalk and the wave that falls on it.
 
 use crate::error::{Error, Result};
-use crate::field::{Complex32, Complex64, Grid, angle, phasor, zeroed};
-use crate::panel::simulated::{blurred, illuminate};
-use crate::panel::{DriveCurve, Illumination, Modulation, PanelProfile};
+use crate::field::{Complex32, Complex64, Grid, angle, phasor};
+use crate::panel::crosstalk::{mixed, spread};
+use crate::panel::simulated::illuminate;
+use crate::panel::{DriveCurve, Illumination, Modulation, PanelProfile, Wavefront};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
@@ -17,10 +18,10 @@ pub(super) struct PanelModel {
     fill: f32,
     /// Standard deviation of the Gaussian that blends neighbouring pixels' phases [pixels].
     crosstalk: f64,
-    /// Light of the dead space, seen along the axis: (1 − F)·d.
+    /// Light that no level changes, seen along the axis: the dead space's (1 − F)·d, and what else comes back unmodulated.
     pub(super) dead: f32,
     /// The wave that falls on each pixel; absent: 1 everywhere.
-    incident: Option<Vec<Complex32>>,
+    pub(super) incident: Option<Vec<Complex32>>,
     /// Ends between which the panel can move, where it has less than a turn.
     pub(super) range: Option<Range>,
 }
@@ -56,13 +57,25 @@ impl PanelModel {
     const BINS: usize = 1 << 14;
 
     pub(super) fn new(profile: &PanelProfile, wavelength: f64, illumination: Illumination) -> Result<Self> {
+        Self::bent(profile, wavelength, illumination, None)
+    }
+
+    /// The same of a panel whose wavefront error is the opposite of this correction: the incident wave has it, so that wishes
+    /// carry the correction themselves, and what comes back unmodulated or runs between pixels does as it does on the panel.
+    pub(super) fn bent(
+        profile: &PanelProfile,
+        wavelength: f64,
+        illumination: Illumination,
+        correction: Option<&Wavefront>,
+    ) -> Result<Self> {
         if profile.modulation() != Modulation::Phase {
             let what = format!("{} modulates amplitude; the iterations here need a phase panel", profile.name);
             return Err(Error::parameter("panel", what));
         }
         let grid = profile.grid()?;
         let curve = profile.drive_curve(wavelength)?.0;
-        let fill = profile.fill_factor;
+        let [kept, lost] = [1.0 - profile.unmodulated, profile.unmodulated].map(f64::sqrt);
+        let fill = profile.fill_factor * kept;
         let shown = (0..Self::BINS)
             .map(|bin| {
                 let wish = (bin as f64 + 0.5) / Self::BINS as f64 * std::f64::consts::TAU;
@@ -72,15 +85,22 @@ impl PanelModel {
                 (phase as f32, Complex32::new(phasor.re as f32, phasor.im as f32))
             })
             .collect();
-        let incident = match illumination {
-            Illumination::Normal => None,
-            other => {
-                let mut wave = vec![Complex32::new(1.0, 0.0); grid.len()];
-                illuminate(&mut wave, grid, wavelength, other)?;
-                Some(wave)
+        let beam = profile.beam_amplitude()?;
+        let incident = if illumination == Illumination::Normal && beam.is_none() && correction.is_none() {
+            None
+        } else {
+            let mut wave = match beam {
+                Some(beam) => beam.iter().map(|&amplitude| Complex32::new(amplitude, 0.0)).collect(),
+                None => vec![Complex32::new(1.0, 0.0); grid.len()],
+            };
+            illuminate(&mut wave, grid, wavelength, illumination)?;
+            if let Some(correction) = correction {
+                correction.check(grid.width, grid.height, wavelength)?;
+                wave.par_iter_mut().zip(&correction.phase).for_each(|(u, phase)| *u *= phasor(-phase * (1.0 / TAU)));
             }
+            Some(wave)
         };
-        let dead = ((1.0 - fill) * profile.dead_space) as f32;
+        let dead = ((1.0 - profile.fill_factor) * profile.dead_space * kept + lost) as f32;
         let (fill, crosstalk) = (fill as f32, profile.crosstalk);
         Ok(Self { grid, shown, fill, crosstalk, dead, incident, range: range(&curve) })
     }
@@ -101,19 +121,18 @@ impl PanelModel {
             (modulated + incident * self.dead, modulated)
         };
         let (total, modulated) = if self.crosstalk > 0.0 {
-            let phases = self.blended_phases(wishes);
-            phases.par_iter().enumerate().map(|(i, &p)| lit(i, phasor(p * (1.0 / TAU)) * self.fill)).unzip()
+            self.mixed(wishes).par_iter().enumerate().map(|(i, &u)| lit(i, u * self.fill)).unzip()
         } else {
             wishes.par_iter().enumerate().map(|(i, &wish)| lit(i, self.show(wish).1)).unzip()
         };
         Light { total, modulated }
     }
 
-    /// Phases that the panel shows where neighbours blend.
-    fn blended_phases(&self, wishes: &[f32]) -> Vec<f32> {
+    /// Phasors of the pixels where neighbours blend: the mean over each.
+    fn mixed(&self, wishes: &[f32]) -> Vec<Complex32> {
         let mut phases = vec![0.0f32; wishes.len()];
         phases.par_iter_mut().zip(wishes).for_each(|(phase, &wish)| *phase = self.show(wish).0);
-        blurred(&phases, self.grid.width, self.crosstalk)
+        mixed(&phases, self.grid.width, self.crosstalk, |phase| phasor(phase * (1.0 / TAU)))
     }
 
     /// The light of all pixels where neighbours blend, which no pixel's own wish tells; `None` without crosstalk.
@@ -121,12 +140,8 @@ impl PanelModel {
         if !self.blends() {
             return None;
         }
-        let phases = self.blended_phases(wishes);
-        let mut light = zeroed(wishes.len());
-        let width = self.grid.width;
-        light.par_chunks_mut(width).zip(phases.par_chunks(width)).for_each(|(light, phases)| {
-            light.iter_mut().zip(phases).for_each(|(u, &p)| *u = phasor(p * (1.0 / TAU)) * self.fill + self.dead);
-        });
+        let mut light = self.mixed(wishes);
+        light.par_iter_mut().for_each(|u| *u = *u * self.fill + self.dead);
         if let Some(wave) = &self.incident {
             light.par_iter_mut().zip(wave).for_each(|(u, wave)| *u *= wave);
         }
@@ -138,9 +153,10 @@ impl PanelModel {
         self.crosstalk > 0.0
     }
 
-    /// Slopes of what the panel shows as slopes of its pixels' wishes: crosstalk spreads each over its neighbours.
+    /// Slopes of what the panel shows as slopes of its pixels' wishes: crosstalk spreads each over its neighbours. The parts of
+    /// a pixel are taken for alike, which they are but beside wraps.
     pub(super) fn pulled_back(&self, slopes: Vec<f32>) -> Vec<f32> {
-        if self.crosstalk > 0.0 { blurred(&slopes, self.grid.width, self.crosstalk) } else { slopes }
+        if self.crosstalk > 0.0 { spread(&slopes, self.grid.width, self.crosstalk) } else { slopes }
     }
 
     /// The wish of pixel `i` whose light comes nearest to a wished light of any modulus, from the wish that it has and the
@@ -179,4 +195,39 @@ fn range(curve: &DriveCurve) -> Option<Range> {
     let step = span / (curve.levels().max(2) - 1) as f64;
     let low = curve.values().iter().fold(f64::INFINITY, |low, &v| low.min(v));
     (std::f64::consts::TAU - span > 8.0 * step).then_some(Range { low: low as f32, high: (low + span) as f32 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::{npy, relative_error};
+    use crate::panel::{Faults, Pattern, PhasePattern, Simulation, drive, simulate};
+    use crate::progress::Progress;
+    use crate::random::Random;
+
+    /// What the encoder counts on is what the simulated panel shows: beam, unmodulated light, dead space, crosstalk and bend.
+    #[test]
+    fn the_light_of_a_bent_panel_in_its_beam_is_the_simulated_panels() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("beam.npy");
+        let (width, height) = (24, 16);
+        let beam: Vec<f32> = (0..width * height).map(|i| (-1e-3 * (i as f32 - 150.0).powi(2) / 300.0).exp()).collect();
+        npy::write_intensity(&path, width, height, &beam).expect("write");
+        let mut profile = PanelProfile::phase(width, height, 8e-6, 8, 532e-9).expect("profile");
+        (profile.fill_factor, profile.dead_space, profile.crosstalk) = (0.9, 0.7, 0.4);
+        (profile.unmodulated, profile.beam) = (0.08, Some(path));
+        let bend: Vec<f32> = (0..width * height).map(|i| 0.02 * i as f32).collect();
+        let error = Wavefront::new("bend", width, height, Some(532e-9), bend).expect("wavefront");
+        let correction = error.clone().conjugate();
+        let model = PanelModel::bent(&profile, 532e-9, Illumination::Normal, Some(&correction)).expect("model");
+        let mut random = Random::new(1, 2);
+        let wishes: Vec<f32> = (0..width * height).map(|_| random.phase() as f32).collect();
+        let pattern = PhasePattern::new(model.grid, 532e-9, wishes.clone()).expect("pattern");
+        let frame = drive(&Pattern::Phase(pattern), None, &profile).expect("frame").frame;
+        let faults = Faults { wavefront_error: Some(error), ..Faults::default() };
+        let shown = simulate(&frame, &Simulation { faults, ..Simulation::default() }, &Progress::new()).expect("light");
+        let off = relative_error(&model.light(&wishes).total, &shown.samples);
+        assert!(off < 1e-3, "{off}");
+        assert!(relative_error(&model.blended(&wishes).expect("blends"), &shown.samples) < 1e-3);
+    }
 }

@@ -49,6 +49,7 @@ impl PanelProfile {
         };
         within("fill_factor", self.fill_factor, 0.0..=1.0, "")?;
         within("dead_space", self.dead_space, 0.0..=1.0, "")?;
+        within("unmodulated", self.unmodulated, 0.0..=1.0, "")?;
         if !(0.0..=8.0).contains(&self.crosstalk) {
             return Err(format!("crosstalk = {} must be 0 … 8 pixels", self.crosstalk));
         }

@@ -22,7 +22,9 @@
 //!
 //! What has been done stands in the frame's metadata ([`frame::Applied`]), so that nothing is done twice.
 
+mod beam;
 mod bounds;
+pub(crate) mod crosstalk;
 pub mod drive;
 mod drive_curve;
 mod embedded;

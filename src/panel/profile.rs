@@ -86,6 +86,13 @@ pub struct PanelProfile {
     /// Standard deviation of the Gaussian by which neighbouring pixels' phases blend [pixels]; 0 where it is not known.
     #[serde(default)]
     pub crosstalk: f64,
+    /// Share of the light that comes back unmodulated beside the dead space's (cover glass, and what the liquid crystal does not
+    /// take): fields are √(1 − q) of the pixels' and √q of level phase zero's; 0 where it is not known.
+    #[serde(default)]
+    pub unmodulated: f64,
+    /// File with the amplitude of the laser's beam on each pixel, 1 at the brightest (`.npy`, H×W).
+    #[serde(default)]
+    pub beam: Option<PathBuf>,
     /// Files of wavefront corrections.
     #[serde(default)]
     pub corrections: Vec<CorrectionFile>,
@@ -157,6 +164,8 @@ impl PanelProfile {
             refresh: None,
             edid: None,
             crosstalk: 0.0,
+            unmodulated: 0.0,
+            beam: None,
             corrections: Vec::new(),
             unverified: Vec::new(),
         })

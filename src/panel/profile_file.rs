@@ -89,6 +89,8 @@ fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
         "fill_factor",
         "dead_space",
         "crosstalk",
+        "unmodulated",
+        "beam",
         "wavelengths",
         "phase_sign",
         "settle_time",
@@ -138,6 +140,8 @@ fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
         edid: file.edid,
         corrections,
         crosstalk: file.crosstalk,
+        unmodulated: at.within("unmodulated", file.unmodulated, 0.0..=1.0)?,
+        beam: file.beam.map(|path| at.beside(&path)),
         unverified: file.unverified,
     };
     profile.check().map(|()| profile).or_else(|what| at.refuse(what))
@@ -299,6 +303,8 @@ mod tests {
         profile.phase_sign = PhaseSign::Decreasing;
         profile.settle_time = Some(0.0123456789);
         profile.crosstalk = 0.35;
+        profile.unmodulated = 0.07;
+        profile.beam = Some("beam.npy".into());
         profile.corrections = vec![CorrectionFile { file: "flat.npy".into(), wavelength: Some(532.123456789e-9) }];
         let polynomial = |range: f64| Curve::Polynomial { coefficients: vec![0.0, range, 0.1] };
         let curves = vec![polynomial(6.0), polynomial(6.1), polynomial(6.2)];

@@ -24,6 +24,9 @@ pub(super) struct ProfileFile {
     pub(super) dead_space: f64,
     #[serde(default, skip_serializing_if = "is_zero")]
     pub(super) crosstalk: f64,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub(super) unmodulated: f64,
+    pub(super) beam: Option<PathBuf>,
     pub(super) wavelengths: Vec<Quantity>,
     #[serde(default, skip_serializing_if = "is_increasing")]
     pub(super) phase_sign: PhaseSign,

@@ -32,6 +32,8 @@ impl PanelProfile {
             fill_factor: self.fill_factor,
             dead_space: self.dead_space,
             crosstalk: self.crosstalk,
+            unmodulated: self.unmodulated,
+            beam: self.beam.clone(),
             wavelengths: self.wavelengths.iter().map(|w| length(*w)).collect(),
             phase_sign: self.phase_sign,
             settle_time: self.settle_time.map(|time| Quantity(format!("{time:?}s"))),

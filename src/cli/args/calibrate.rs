@@ -20,6 +20,11 @@ pub(crate) enum CalibrateCommand {
         after_long_help = "Examples:\n  holodrive calibrate flatness --panel mine.toml --steps 4 -o steps\n  holodrive calibrate flatness --panel mine.toml --interferograms i0.png,i1.png,i2.png,i3.png -o flat.npy --into mine.toml\n  holodrive calibrate flatness --panel mine.toml --zernike 0,0,0,0.8,-0.1 --radius 6mm -o flat.png"
     )]
     Flatness(FlatnessArgs),
+    /// All of it by a camera: without --photos or --camera-command the frames to show, with one of them the profile.
+    #[command(
+        after_long_help = "Examples:\n  holodrive calibrate camera --panel holoeye-pluto-2.1 --wavelength 532nm -o patterns\n  holodrive calibrate camera --panel holoeye-pluto-2.1 --wavelength 532nm --photos photos --lens 200mm --camera-pitch 3.45um -o mine.toml\n  holodrive calibrate camera --panel holoeye-pluto-2.1 --wavelength 532nm --camera-command './grab {frame} {photo}.png' --lens 200mm --camera-pitch 3.45um -o mine.toml\n\nThe camera stands in the focal plane of a lens behind the panel and sees the zero order with the square about it that the dots fill. Each photo is named as its frame (dots, random-0 … random-9), .npy, .png, .tif or .bmp, linear in the light (no gamma, no automatic gain within a photo); exposures may differ. The command shows {frame} and writes its photo to {photo} with an ending.\n\nFound are the camera's mapping, the wavefront error, the level curve over the panel, the beam's amplitude, crosstalk and unmodulated light, each with its uncertainty. mine.toml holds them, with mine-correction.npy and mine-beam.npy beside it."
+    )]
+    Camera(CameraArgs),
     /// Test cards whose errors an eye sees.
     #[command(
         after_long_help = "Examples:\n  holodrive calibrate check --panel mine.toml -o cards\n  holodrive calibrate check --panel mine.toml --monitor HDMI-1 --hold 10 -o cards"
@@ -88,6 +93,30 @@ pub(crate) struct FlatnessArgs {
     /// Also write the panel's profile with this correction to this file.
     #[arg(long, value_name = "FILE")]
     pub(crate) into: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) shown: ShownArgs,
+    #[command(flatten)]
+    pub(crate) panel: PanelArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CameraArgs {
+    /// Folder with the photos, each named as its frame: find what they tell.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["camera_command", "monitor"])]
+    pub(crate) photos: Option<PathBuf>,
+    /// Command that shows a frame and takes its photo, run for each: {frame} is the frame's PNG, {photo} the photo's path
+    /// without an ending.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "monitor")]
+    pub(crate) camera_command: Option<String>,
+    /// Focal length of the lens between panel and camera.
+    #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
+    pub(crate) lens: Option<f64>,
+    /// Distance of neighbouring pixels of the camera.
+    #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
+    pub(crate) camera_pitch: Option<f64>,
+    /// Folder for the frames [default: patterns], or the profile to write [default: calibrated.toml].
+    #[arg(short, long, value_name = "PATH")]
+    pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) shown: ShownArgs,
     #[command(flatten)]

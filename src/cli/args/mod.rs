@@ -22,7 +22,7 @@ mod viewer;
 mod views;
 
 pub(crate) use bench::{BenchCommand, BenchViewsArgs, EncodingsArgs, IterationsArgs};
-pub(crate) use calibrate::{CalibrateCommand, CheckArgs, CurveArgs, FlatnessArgs, ShownArgs};
+pub(crate) use calibrate::{CalibrateCommand, CameraArgs, CheckArgs, CurveArgs, FlatnessArgs, ShownArgs};
 pub(crate) use encoding::EncodingArgs;
 pub(crate) use field::FieldArgs;
 pub(crate) use groups::{Group, unused};

@@ -224,6 +224,9 @@ impl<S: Sight> Problem<'_, S> {
         let row = |row: usize, out: &mut [Complex32]| {
             let wishes = &wish[row * width..][..width];
             out.iter_mut().zip(wishes).for_each(|(u, &wish)| *u = self.model.show(wish).1 + self.model.dead);
+            if let Some(wave) = &self.model.incident {
+                out.iter_mut().zip(&wave[row * width..]).for_each(|(u, wave)| *u *= wave);
+            }
         };
         self.sight.fields(looks, &row, self.progress)
     }
@@ -262,6 +265,7 @@ impl<S: Sight> Problem<'_, S> {
         adam: &Adam,
     ) {
         let width = self.model.grid.width;
+        let (incident, one) = (self.model.incident.as_ref(), Complex32::new(1.0, 0.0));
         let Frame { wish, moments: [first, second] } = frame;
         let slope = |pulled: &Complex32, light: Complex32| -2.0 * (pulled.conj() * light).im;
         let rows = wish.chunks_mut(width).zip(first.chunks_mut(width)).zip(second.chunks_mut(width));
@@ -273,10 +277,17 @@ impl<S: Sight> Problem<'_, S> {
                 // Slopes by the phases that the panel shows. Those by the wishes are these blended once more; without that
                 // the way still leads down, since a Gaussian has no negative part in its spectrum, and what crosstalk
                 // weakens moves as fast as all else: 1.6π with a crosstalk of 0.3 pixels comes to 41.2 dB of Cornell's room
-                // where blended slopes come to 40.5, in 50 steps.
+                // where blended slopes come to 40.5, in 50 steps (of a panel that showed each pixel's middle phase all over it).
                 let light = &light[row * width..][..width];
-                cells.zip(light).for_each(|((((wish, first), second), p), u)| {
-                    adam.turn(wish, first, second, slope(p, u - self.model.dead));
+                cells.zip(light).enumerate().for_each(|(column, ((((wish, first), second), p), u))| {
+                    let still = incident.map_or(one, |wave| wave[row * width + column]) * self.model.dead;
+                    adam.turn(wish, first, second, slope(p, u - still));
+                });
+                return;
+            }
+            if let Some(wave) = incident {
+                cells.zip(&wave[row * width..]).for_each(|((((wish, first), second), p), wave)| {
+                    adam.turn(wish, first, second, slope(p, self.model.show(*wish).1 * wave));
                 });
                 return;
             }

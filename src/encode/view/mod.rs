@@ -150,7 +150,9 @@ impl ViewEncoding {
             return Err(Error::out_of_range("subframes", count, "must be 1 to 1000"));
         }
         target.viewer.check()?;
-        let model = PanelModel::new(&target.setup.profile, target.wavelength, Illumination::Normal)?;
+        let (correction, warnings) = target.setup.correction(target.wavelength)?;
+        let profile = &target.setup.profile;
+        let model = PanelModel::bent(profile, target.wavelength, Illumination::Normal, correction.as_ref())?;
         let targets = Targets::new(target.retina, target.light, target.wavelength, progress)?;
         if target.light.is_dark() {
             return Err(Error::parameter("light field", "is dark everywhere; there is nothing to show"));
@@ -188,11 +190,12 @@ impl ViewEncoding {
         };
         let step_seconds = stepping.elapsed().as_secs_f64() / iterations.max(1) as f64;
         let history: Vec<f64> = found.history.iter().map(|loss| -10.0 * loss.max(1e-30).log10()).collect();
-        let (correction, warnings) = target.setup.correction(target.wavelength)?;
         let frame = |wishes: &Vec<f32>| -> Result<Encoded> {
             let phase = wishes.iter().map(|w| w.rem_euclid(TAU as f32)).collect();
             let pattern = Pattern::Phase(PhasePattern::new(model.grid, target.wavelength, phase)?);
-            let mut driven = drive(&pattern, correction.as_ref(), &target.setup.profile)?;
+            // The wishes have the correction in them.
+            let mut driven = drive(&pattern, None, profile)?;
+            driven.frame.metadata.applied.correction = correction.as_ref().map(|correction| correction.name.clone());
             let parameters = serde_json::json!({
                 "iterations": iterations, "seed": self.seed, "frames": count,
                 "eye": target.viewer.eye.to_array(), "eye_box": target.viewer.eye_box.to_array(),

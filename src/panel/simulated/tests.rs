@@ -30,6 +30,8 @@ fn panel(width: usize, height: usize, fill_factor: f64, dead_space: f64, curve: 
         edid: None,
         corrections: Vec::new(),
         crosstalk: 0.0,
+        unmodulated: 0.0,
+        beam: None,
         unverified: Vec::new(),
     }
 }
