@@ -25,6 +25,7 @@ pub(super) fn calibrate(command: &CalibrateCommand) -> Result<Report> {
         CalibrateCommand::Flatness(args) if args.interferograms.is_empty() && args.zernike.is_empty() => steps(args),
         CalibrateCommand::Flatness(args) => flatness(args),
         CalibrateCommand::Check(args) => check(args),
+        CalibrateCommand::Plate(args) => super::calibrate_plate::plate(args),
     }
 }
 
