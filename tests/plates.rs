@@ -171,16 +171,16 @@ impl Scanner {
     }
 }
 
-/// Share of the incident light in the first order of what was printed for a point far behind the plate: |⟨t·exp(−iφ)⟩|², with t
+/// Share of the incident light in an order m of what was printed for a point far behind the plate: |⟨t·exp(−imφ)⟩|², with t
 /// the amplitude transmittance and φ the phase of the point's wave beside the reference's.
-fn efficiency(printed: &Printed, plate: &Grating) -> f64 {
+fn efficiency(printed: &Printed, plate: &Grating, order: f64) -> f64 {
     let (mut re, mut im) = (0.0, 0.0);
     for (i, t) in printed.transmittance.iter().enumerate() {
         let place = |at: usize, count: usize| ((at as f64 + 0.5) - 0.5 * count as f64) * plate.pitch / FINE as f64;
         let (x, y) = (place(i % printed.width, printed.width), -place(i / printed.width, printed.height));
         let way = (x * x + y * y + plate.distance * plate.distance).sqrt() - plate.distance;
         let turns = way / plate.wavelength - plate.sine * x / plate.wavelength;
-        let (sine, cosine) = (-TAU * turns.fract()).sin_cos();
+        let (sine, cosine) = (-TAU * order * turns.fract()).sin_cos();
         let amplitude = f64::from(*t).sqrt();
         (re, im) = (re + amplitude * cosine, im + amplitude * sine);
     }
@@ -219,13 +219,14 @@ fn prepare(folder: &Path) {
     }
 }
 
-/// Prints a plate of a profile by the program, then on a printer: the first order's share of the light.
-fn diffracted(folder: &Path, profile: &str, printer: &Printer) -> f64 {
+/// Prints a plate of a profile by the program, then on a printer: the first and the second order's share of the light.
+fn diffracted(folder: &Path, profile: &str, printer: &Printer) -> [f64; 2] {
     let output = format!("plate-{profile}-{}", fs::read_dir(folder).expect("folder").count());
     done(folder, &["print", "point.ply", "--plate", &format!("{profile}.toml"), "-o", &output]);
     let levels = Levels::read(&folder.join(&output).join("plate.tif"));
     assert_eq!((levels.width, levels.height), (640, 512));
-    efficiency(&printer.print(&levels), &GRATING)
+    let printed = printer.print(&levels);
+    [1.0, 2.0].map(|order| efficiency(&printed, &GRATING, order))
 }
 
 /// Film between its base and its fog.
@@ -248,6 +249,12 @@ fn lines_that_come_out_too_narrow_are_drawn_wider() {
     let f = folder.path();
     prepare(f);
     let printer = Printer { spot: 1.0, response: underexposed };
+    // What it makes of lines of four pixels in eight.
+    let lines: Vec<f32> = (0..800 * 16).map(|i| if i % 800 % 8 < 4 { 1.0 } else { 0.0 }).collect();
+    let made = printer.print(&Levels { width: 800, height: 16, values: lines });
+    let mean = made.transmittance.iter().map(|t| f64::from(*t)).sum::<f64>() / made.transmittance.len() as f64;
+    let made = 8.0 * ((mean - film(0.0)) / (film(1.0) - film(0.0)) - 0.5);
+    assert!((made + 1.2).abs() < 0.1, "{made}");
     let card = done(f, &["calibrate", "plate", "--plate", "threshold.toml", "--patch", "0.72mm", "-o", "card"]);
     assert_eq!(card["patch"], 144, "{card}");
     done(f, &["print", "verify", "card"]);
@@ -268,21 +275,21 @@ fn lines_that_come_out_too_narrow_are_drawn_wider() {
         let bias = [0, 1].map(|axis| found["transfer"]["line_bias"][axis].as_f64().expect("bias") / 5e-6);
         let sure = [0, 1].map(|axis| found["line_uncertainty"][axis].as_f64().expect("uncertainty") / 5e-6);
         println!(
-            "{scan}: lines grow by {bias:.3?} ± {sure:.3?} px (-1.2 made), dot gain {}, turned by {}",
+            "{scan}: lines grow by {bias:.3?} ± {sure:.3?} px ({made:.3} made), dot gain {}, turned by {}",
             found["gain"], found["rotation"]
         );
         assert_eq!(found["mirrored"], mirrored);
-        assert!(bias.iter().all(|b| (b + 1.2).abs() < 0.1), "{found}");
-        assert!(sure.iter().all(|s| *s < 0.1), "{found}");
-        assert!((found["gain"].as_f64().expect("gain") + 0.15).abs() < 0.015, "{found}");
+        assert!(bias.iter().all(|b| (b - made).abs() < 0.05), "{found}");
+        assert!(sure.iter().all(|s| *s < 0.03), "{found}");
+        assert!((found["gain"].as_f64().expect("gain") - made / 8.0).abs() < 0.01, "{found}");
     }
     for name in ["threshold", "pulse-width", "diffusion"] {
         let profile = format!("{name}.toml");
         let better = format!("{name}-measured.toml");
         done(f, &["calibrate", "plate", "scan.tif", "--plate", &profile, "-o", &better]);
-        let ideal = diffracted(f, name, &IDEAL);
-        let without = diffracted(f, name, &printer);
-        let with = diffracted(f, &format!("{name}-measured"), &printer);
+        let [ideal, _] = diffracted(f, name, &IDEAL);
+        let [without, _] = diffracted(f, name, &printer);
+        let [with, _] = diffracted(f, &format!("{name}-measured"), &printer);
         println!(
             "{name}: first order {ideal:.4} of an ideal printer, {without:.4} ({:+.1} %) of this one, {with:.4} ({:+.1} %) with its \
              transfer",
@@ -294,7 +301,9 @@ fn lines_that_come_out_too_narrow_are_drawn_wider() {
             let analytic = (film(1.0).sqrt() - film(0.0).sqrt()).powi(2) / (PI * PI);
             assert!((ideal / analytic - 1.0).abs() < 0.05, "{ideal} is not {analytic}");
         }
-        assert!((with / ideal - 1.0).abs() < 0.03, "{name}: {with} of {ideal}");
+        // Of the single dots of error diffusion this spot makes lines: more light than an ideal printer's dots diffract.
+        let most = if name == "diffusion" { f64::INFINITY } else { 1.03 };
+        assert!((0.97..most).contains(&(with / ideal)), "{name}: {with} of {ideal}");
         assert!(without / ideal < 0.9, "{name}: {without} of {ideal} without the transfer");
     }
     // The transfer is part of what a folder was begun with.
@@ -319,7 +328,7 @@ fn tones_become_amplitudes_that_are_linear_in_the_fringe() {
     prepare(f);
     done(f, &["calibrate", "plate", "--plate", "gray.toml", "--patch", "0.5mm", "-o", "card"]);
     for (name, response) in [("positive", positive as fn(f64) -> f64), ("negative", negative)] {
-        let printer = Printer { spot: 0.4, response };
+        let printer = Printer { spot: 0.15, response };
         let printed = printer.print(&Levels::read(&f.join("card/plate.tif")));
         let scan = format!("{name}.png");
         let scanner = Scanner { scale: 0.41, rotation_deg: -0.7, mirrored: false };
@@ -339,16 +348,20 @@ fn tones_become_amplitudes_that_are_linear_in_the_fringe() {
         let ideal = (high - low).powi(2) / 16.0;
         let without = diffracted(f, "gray", &printer);
         let with = diffracted(f, "gray-measured", &printer);
-        // The spot of 0.4 pixels takes its part of a fringe of eight pixels, whatever the tone.
-        let spot = (-2.0 * (PI * 0.4 / 8.0).powi(2)).exp().powi(2);
         println!(
-            "{name}: curve within {worst:.4}; first order {ideal:.4} ideal, {without:.4} ({:+.1} %) without, {with:.4} ({:+.1} %) with the \
-             transfer",
-            100.0 * (without / ideal / spot - 1.0),
-            100.0 * (with / ideal / spot - 1.0)
+            "{name}: curve within {worst:.4}; first order {ideal:.4} ideal, {:.4} ({:+.1} %) without, {:.4} ({:+.1} %) with the transfer; \
+             second {:.5} without, {:.5} with it",
+            without[0],
+            100.0 * (without[0] / ideal - 1.0),
+            with[0],
+            100.0 * (with[0] / ideal - 1.0),
+            without[1],
+            with[1]
         );
         assert!(worst < 0.01, "{name}: the curve is off by {worst}");
-        assert!((with / ideal / spot - 1.0).abs() < 0.03, "{name}: {with} of {ideal}");
+        assert!((with[0] / ideal - 1.0).abs() < 0.03, "{name}: {with:?} of {ideal}");
+        // What is not linear makes second orders of every fringe: a ghost.
+        assert!((without[0] / ideal - 1.0).abs() > 0.03 && without[1] > 10.0 * with[1], "{name}: {without:?} {with:?}");
         fs::remove_file(f.join("gray-measured.toml")).expect("profile");
     }
 }

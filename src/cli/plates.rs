@@ -60,15 +60,15 @@ impl Listed {
         };
         let field = self.field.map(|[w, h]| marked(format!("fields {w}×{h}"), "printer.field")).unwrap_or_default();
         let line = format!(
-            "{:<14} {:<14} {:<7} {:<6} ±{:<6} {:<20} {:<18} {:<38}",
+            "{:<14} {:<15} {:<7} {:<6} ±{:<6} {:<10} {:<18} {:<38}",
             self.name,
-            format!("{:.4}×{:.4} mm", self.extent[0] * 1e3, self.extent[1] * 1e3).replace(".0000", ""),
+            format!("{}×{} mm", millimetres(self.extent[0]), millimetres(self.extent[1])),
             marked(show_pitch(self.pitch), "pitch"),
             format!("{} bit", self.bits),
             format!("{:.1}°", self.diffraction_angle[0].to_degrees()),
             match self.quantity {
                 Quantity::Bipolar => "amplitude",
-                Quantity::Intensity => "amplitude, |u+r|²",
+                Quantity::Intensity => "intensity",
                 Quantity::Phase => "phase",
             },
             field,
@@ -79,6 +79,12 @@ impl Listed {
             open => format!("{line} not checked: {}", open.join(", ")),
         }
     }
+}
+
+/// A length in millimetres, to a hundredth.
+fn millimetres(metres: f64) -> String {
+    let text = format!("{:.2}", metres * 1e3);
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// Lists the built-in plates.

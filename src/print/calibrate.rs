@@ -285,7 +285,8 @@ fn one_bit(plate: &Plate, card: &Card, light: &[f64], scan: &Path, out: &mut Pla
 const USABLE: std::ops::Range<f64> = 0.05..0.95;
 
 /// By how many pixels lines grow along an axis, with its standard uncertainty: of periods within a factor of two of the
-/// carrier's where there are six, else of all.
+/// carrier's where there are six, else of all. Lines that grow quite unlike most (the finest, which half run together) are
+/// left out: those farther from the median than four times the median of such distances.
 fn growth(lines: &[Lines], axis: usize, carrier: Option<f64>) -> Option<[f64; 2]> {
     let usable: Vec<&Lines> =
         lines.iter().filter(|lines| lines.axis == axis && USABLE.contains(&lines.printed)).collect();
@@ -295,12 +296,25 @@ fn growth(lines: &[Lines], axis: usize, carrier: Option<f64>) -> Option<[f64; 2]
     if taken.len() < 3 {
         return None;
     }
-    let weight: f64 = taken.iter().map(|lines| f64::from(lines.period).powi(-2)).sum();
-    let grown = |lines: &&Lines| (lines.printed - lines.drawn) / f64::from(lines.period);
-    let growth = taken.iter().map(grown).sum::<f64>() / weight;
+    let grown = |lines: &Lines| (lines.printed - lines.drawn) * f64::from(lines.period);
+    let usual = median(taken.iter().map(|lines| grown(lines)));
+    let spread = median(taken.iter().map(|lines| (grown(lines) - usual).abs())).max(LIKE);
+    let alike: Vec<&Lines> = taken.into_iter().filter(|lines| (grown(lines) - usual).abs() <= 4.0 * spread).collect();
+    let weight: f64 = alike.iter().map(|lines| f64::from(lines.period).powi(-2)).sum();
+    let growth =
+        alike.iter().map(|lines| (lines.printed - lines.drawn) / f64::from(lines.period)).sum::<f64>() / weight;
     let left = |lines: &&Lines| (lines.printed - lines.drawn - growth / f64::from(lines.period)).powi(2);
-    let variance = taken.iter().map(left).sum::<f64>() / (taken.len() - 1) as f64;
+    let variance = alike.iter().map(left).sum::<f64>() / (alike.len().max(2) - 1) as f64;
     Some([growth, (variance / weight).sqrt()])
+}
+
+/// Growths that differ by so many pixels are alike.
+const LIKE: f64 = 0.01;
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Period of the reference's fringes in the middle of the plate [px].
@@ -370,8 +384,13 @@ mod tests {
             .flat_map(|&period| [0.25, 0.5, 0.75].map(|drawn| (period, drawn)))
             .map(|(period, drawn)| Lines { axis: 0, period, drawn, printed: drawn - 0.6 / f64::from(period) })
             .collect();
-        let [growth, spread] = growth(&lines, 0, Some(8.0)).expect("growth");
-        assert!((growth + 0.6).abs() < 1e-12 && spread < 1e-12);
-        assert!(super::growth(&lines, 1, None).is_none());
+        let [found, spread] = growth(&lines, 0, Some(8.0)).expect("growth");
+        assert!((found + 0.6).abs() < 1e-12 && spread < 1e-12);
+        assert!(growth(&lines, 1, None).is_none());
+        // The finest run together.
+        let mut merged = lines;
+        merged[2].printed = 0.9;
+        let [found, _] = growth(&merged, 0, Some(8.0)).expect("growth");
+        assert!((found + 0.6).abs() < 1e-12, "{found}");
     }
 }

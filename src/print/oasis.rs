@@ -53,7 +53,7 @@ pub(super) fn rectangle(out: &mut Bytes, last: &mut Last, x: [u64; 2], y: [u64; 
     let (width, height) = (x[1] - x[0], y[1] - y[0]);
     let first = last.width.is_none();
     let news = [last.width != Some(width), last.height != Some(height), last.y != Some(y[0])];
-    let mut bytes = vec![20, 0x10 | u8::from(first) * 3];
+    let mut bytes = vec![20, 0x10 | (u8::from(first) * 3)];
     if first {
         // Layer and datatype.
         bytes.extend([1, 0]);
