@@ -257,6 +257,19 @@ fn one_bit(plate: &Plate, card: &Card, light: &[f64], scan: &Path, out: &mut Pla
         }
     }
     out.steps.push(Step { level: 1.0, amplitude: amplitude(1.0) });
+    let is_half = |patch: &Patch| matches!(patch, Patch::Tone { wanted, .. } if *wanted == 0.5);
+    let half = card.half.iter().zip(light).find(|(patch, _)| is_half(patch)).map(|(_, light)| share(*light));
+    if let Some(half) = half
+        && plate.fringe.binarisation == Binarisation::Diffusion
+        && !DOTS.contains(&half)
+    {
+        let what = format!(
+            "error diffusion of half of the pixels came out as {:.0} % of the area: single dots do not print; set binarisation = \
+             \"pulse-width\" or \"threshold\" in the plate and give the command again",
+            100.0 * half.clamp(0.0, 1.0)
+        );
+        return Err(Error::input(scan, what));
+    }
     let pitch = [plate.raster.pitch_x, plate.raster.pitch_y];
     let carrier = carrier_period(plate);
     let fits = [0, 1].map(|axis| growth(&out.lines, axis, carrier));
@@ -280,6 +293,9 @@ fn one_bit(plate: &Plate, card: &Card, light: &[f64], scan: &Path, out: &mut Pla
     }
     Ok(())
 }
+
+/// Shares of area, of error diffusion of one half, between which its dots are dots.
+const DOTS: std::ops::Range<f64> = 0.1..0.9;
 
 /// Shares of area between which lines are lines: beyond, they are gone or have run together.
 const USABLE: std::ops::Range<f64> = 0.05..0.95;
