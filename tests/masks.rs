@@ -267,11 +267,11 @@ fn others(f: &Path, wanted: &[u8]) {
         ),
         (
             "ezdxf",
-            "import ezdxf\nfor names in (['plate.dxf'],):\n    got = np.zeros_like(raw)\n    \
+            "import ezdxf\nfor names in (sorted(glob.glob('dxf-bands/*.dxf'))[:1],):\n    got = np.zeros_like(raw)\n    \
              for name in names:\n        doc = ezdxf.readfile(name)\n        \
              for e in doc.modelspace().query('POLYLINE'):\n            assert e.is_closed\n            \
              v = np.array([(p.x, p.y) for p in e.points()])\n            draw(got, (*v.min(0), *v.max(0)))\n    \
-             assert (got == raw).all(), names\nprint('levels equal')",
+             assert (got[:128] == raw[:128]).all(), names\nprint('levels of a band equal')",
         ),
         (
             "PIL.Image",

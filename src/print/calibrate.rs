@@ -295,7 +295,7 @@ fn one_bit(plate: &Plate, card: &Card, light: &[f64], scan: &Path, out: &mut Pla
 }
 
 /// Shares of area, of error diffusion of one half, between which its dots are dots.
-const DOTS: std::ops::Range<f64> = 0.1..0.9;
+const DOTS: std::ops::Range<f64> = 0.02..0.98;
 
 /// Shares of area between which lines are lines: beyond, they are gone or have run together.
 const USABLE: std::ops::Range<f64> = 0.05..0.95;
