@@ -84,8 +84,8 @@ impl ConfigFile<'_> {
     /// Distances of neighbouring columns and rows [m], from `pitch` or from `pitch_x` and `pitch_y`.
     pub(crate) fn pitches<T: AsRef<str>>(&self, both: &Option<T>, each: [&Option<T>; 2]) -> Result<[f64; 2]> {
         let pitch = |key: &str, own: &Option<T>| match (own, both) {
-            (Some(text), None) => self.read(key, text, units::positive_length),
-            (None, Some(text)) => self.read("pitch", text, units::positive_length),
+            (Some(text), None) => self.read(key, text, units::pitch),
+            (None, Some(text)) => self.read("pitch", text, units::pitch),
             (Some(_), Some(_)) => self.refuse(format!("{key} stands beside pitch; give pitch, or pitch_x and pitch_y")),
             (None, None) => self.refuse(format!("{key} is missing; give pitch = \"8um\", or pitch_x and pitch_y")),
         };

@@ -101,6 +101,17 @@ pub fn positive_length(text: &str) -> Result<f64> {
     positive(length(text)?, text, "length")
 }
 
+/// Reads a distance of neighbouring pixels: a length, or dots per inch: `5080dpi` → 5e-6 [m].
+pub fn pitch(text: &str) -> Result<f64> {
+    match text.trim().strip_suffix("dpi") {
+        Some(_) => {
+            let dots = positive(parse(text, &[("dpi", 1.0)], "pitch", "5080dpi")?, text, "pitch")?;
+            Ok(0.0254 / dots)
+        }
+        None => positive(parse(text, &LENGTHS, "pitch", "0.5um, 5080dpi")?, text, "pitch"),
+    }
+}
+
 /// Reads an amount of memory with its unit: `2GB` → 2³¹ [bytes].
 pub fn memory(text: &str) -> Result<u64> {
     positive(parse(text, &MEMORIES, "memory", "500MB, 2GB")?.floor(), text, "memory").map(|bytes| bytes as u64)
@@ -168,6 +179,8 @@ mod tests {
             let value = length(text).expect(text);
             assert!((value - metres).abs() <= 1e-15 * metres.abs().max(1e-9), "{text}: {value} is not {metres}");
         }
+        assert!((pitch("5080dpi").expect("dpi") - 5e-6).abs() < 1e-20 && pitch("0.5um").expect("um") == 0.5e-6);
+        assert!(["0dpi", "-5dpi", "dpi", "NaNdpi", "5", "0um"].iter().all(|text| pitch(text).is_err()));
         assert!((angle("180deg").expect("deg") - std::f64::consts::PI).abs() < 1e-15);
         assert!((duration("10ms").expect("ms") - 0.01).abs() < 1e-18);
         assert!((frequency("1.44kHz").expect("kHz") - 1440.0).abs() < 1e-9);

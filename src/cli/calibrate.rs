@@ -25,6 +25,7 @@ pub(super) fn calibrate(command: &CalibrateCommand) -> Result<Report> {
         CalibrateCommand::Flatness(args) => flatness(args),
         CalibrateCommand::Camera(args) => super::calibrate_camera::camera(args),
         CalibrateCommand::Check(args) => check(args),
+        CalibrateCommand::Plate(args) => super::calibrate_plate::plate(args),
     }
 }
 

@@ -6,6 +6,7 @@ mod bar;
 mod bench;
 mod calibrate;
 mod calibrate_camera;
+mod calibrate_plate;
 #[cfg(feature = "display")]
 mod controls;
 mod encode;
@@ -23,6 +24,7 @@ mod monitors;
 mod output;
 mod panels;
 mod pictures;
+mod plates;
 mod print;
 mod reconstruct;
 mod refusal;
@@ -96,6 +98,7 @@ pub fn main(arguments: &[OsString]) -> u8 {
         Command::Print(args) => print::print(&args, json),
         Command::Serve(args) => serve::serve(&args, json),
         Command::Panels(args) => panels::panels(&args),
+        Command::Plates(args) => plates::plates(&args),
         Command::Manual(args) => manual::manual(&args),
         Command::Monitors(args) => monitors::monitors(&args),
         Command::Doctor(args) => monitors::doctor(&args),

@@ -3,9 +3,9 @@
 use super::args::{ExportArgs, FileArgs, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs, White};
 use super::bar::Bar;
 use super::report::{Report, count, seconds};
-use crate::print::export::{Format, Frames, export};
+use crate::print::export::{Frames, export};
 use crate::print::preview::PreviewSettings;
-use crate::print::{Manifest, Plan, Plate, PlateJob, PlateView, PrintSettings, Shard, folder};
+use crate::print::{Asked, Manifest, Plan, Plate, PlateJob, PlateView, PrintSettings, Shard, folder};
 use crate::segments::SceneOptions;
 use crate::units::show_length;
 use crate::{Error, Result};
@@ -36,14 +36,14 @@ pub(super) fn scene_options(file: &FileArgs, bounces: u32, photons: u32, white: 
 fn resolved(args: &PrintArgs) -> Result<PrintSettings> {
     let missing = |what: &str| Error::parameter("print", format!("{what} (see holodrive print --help)"));
     let input = args.input.clone().ok_or_else(|| missing("a scene or points are needed"))?;
-    let path = args.plate.as_ref().ok_or_else(|| missing("--plate FILE is needed"))?;
+    let path = args.plate.as_ref().ok_or_else(|| missing("--plate NAME or FILE is needed"))?;
     let folder = match &args.output {
         None if !args.dry_run => return Err(missing("-o DIR is needed")),
         folder => folder.clone().unwrap_or_default(),
     };
     let light = &args.light;
     Ok(PrintSettings {
-        plate: Plate::read(path)?,
+        plate: Plate::find(path, &Asked { size: args.size, pitch: args.pitch })?,
         input,
         options: scene_options(&light.file, light.bounces, light.photons, light.white)?,
         folder,
@@ -139,7 +139,7 @@ fn report_plan(plan: &Plan, plate: &Plate) -> Report {
     report.section(plan);
     let degrees = |angles: [f64; 2]| format!("{:.2} x {:.2} deg", angles[0].to_degrees(), angles[1].to_degrees());
     report.line(format!(
-        "plate        {} × {} px of {} × {}, {} bit, {:.2} × {:.2} mm",
+        "plate        {} × {} px of {} × {}, {} bit, {:.4} × {:.4} mm",
         plan.size[0],
         plan.size[1],
         show_length(plate.raster.pitch_x),
@@ -254,17 +254,15 @@ fn preview(args: &PreviewArgs) -> Result<Report> {
 
 fn write(args: &ExportArgs) -> Result<Report> {
     let mut report = Report::new("print export");
-    if args.frame.is_none() && matches!(args.format, Format::Png | Format::Bmp) {
-        return Err(Error::parameter("frame", "give the size of an exposure, --frame 1920x1080"));
-    }
-    let frames = args.frame.map(|(width, height)| Frames {
-        size: [width as u64, height as u64],
+    let frames = Frames {
+        size: args.frame.map(|(width, height)| [width as u64, height as u64]),
+        band: args.band,
         overlap: args.overlap,
         serpentine: args.serpentine,
         window: args.window,
-    });
+    };
     let bar = Bar::new();
-    let written = export(&args.folder, args.format, frames.as_ref(), &args.output, &bar.progress)?;
+    let written = export(&args.folder, args.format, &frames, &args.output, &bar.progress)?;
     report.section(&written);
     report.line(format!("files        {}, {}", written.files, bytes(written.bytes)));
     report.output("written", &args.output);

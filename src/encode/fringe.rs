@@ -80,6 +80,42 @@ impl Fringe {
     }
 }
 
+/// Which phases of u·r* are open in one bit: those within `half` of `middle` [rad].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct OpenArc {
+    pub(crate) middle: f32,
+    pub(crate) half: f32,
+}
+
+impl OpenArc {
+    /// 1 where a phase is open, 0 where it is not, with each edge drawn in by a phase [rad]; what has no edges is as it was.
+    pub(crate) fn open(&self, phase: f32, drawn_in: f32) -> f32 {
+        let aside = (phase - self.middle + PI).rem_euclid(2.0 * PI) - PI;
+        let half = if self.half > 0.0 && self.half < PI { self.half - drawn_in } else { self.half };
+        if aside.abs() < half { 1.0 } else { 0.0 }
+    }
+}
+
+impl Fringe {
+    /// What is open of a fringe that is cut at its middle ([`Fringe::value`] above ½), or of the pulses of [`Fringe::pulse`].
+    pub(crate) fn open_arc(&self, u: Complex32, pulses: bool) -> OpenArc {
+        let modulus = u.norm();
+        let cosine = |swing: f32, rest: f32| if swing > 0.0 { (rest / swing).clamp(-1.0, 1.0).acos() } else { 0.0 };
+        match self.quantity {
+            _ if pulses => OpenArc { middle: 0.0, half: (modulus / self.amplitude).min(1.0).asin() },
+            Quantity::Bipolar => {
+                let half = cosine(0.5 * self.contrast * modulus / self.amplitude, 0.5 - self.bias);
+                OpenArc { middle: 0.0, half }
+            }
+            Quantity::Intensity => {
+                let rest = (1.0 - self.bias) * self.brightest / self.contrast - modulus * modulus - self.rho * self.rho;
+                OpenArc { middle: 0.0, half: cosine(2.0 * self.rho * modulus, rest) }
+            }
+            Quantity::Phase => OpenArc { middle: 0.5 * PI, half: 0.5 * PI },
+        }
+    }
+}
+
 /// A carrier along one axis of a grid: the moduli of its lowest and highest spatial frequency [cycles/m].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Carrier {
@@ -163,5 +199,32 @@ pub(crate) fn order_statistic(values: &mut [f32], rank: usize) -> f32 {
     match values.len().checked_sub(1) {
         Some(last) => *values.select_nth_unstable_by(rank.min(last), f32::total_cmp).1,
         None => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_open_arc_is_where_the_value_is_above_its_middle() {
+        for quantity in [Quantity::Bipolar, Quantity::Intensity, Quantity::Phase] {
+            for (bias, contrast) in [(0.5, 1.0), (0.4, 1.5)] {
+                let fringe = Fringe::new(quantity, 2.0, 1.3).with_swing(bias, contrast);
+                for i in 0..400 {
+                    let u = Complex32::from_polar(0.007 * i as f32, 0.37 * i as f32);
+                    let r = Complex32::from_polar(1.0, -0.11 * i as f32);
+                    let (value, phase) = (fringe.value(u, r), (u * r.conj()).arg());
+                    if (value - 0.5).abs() > 1e-4 && u.norm() > 0.0 {
+                        let open = fringe.open_arc(u, false).open(phase, 0.0);
+                        assert_eq!(open, f32::from(value > 0.5), "{quantity:?} {bias} {u} {value}");
+                    }
+                    assert_eq!(fringe.open_arc(u, true).open(phase, 0.0), fringe.pulse(u, r));
+                }
+            }
+        }
+        let arc = OpenArc { middle: 0.0, half: 1.0 };
+        assert_eq!([0.9, -0.9, 0.7].map(|phase| arc.open(phase, 0.2)), [0.0, 0.0, 1.0]);
+        assert_eq!([1.1, -1.1, 1.3].map(|phase| arc.open(phase, -0.2)), [1.0, 1.0, 0.0]);
     }
 }

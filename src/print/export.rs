@@ -1,44 +1,24 @@
-//! A finished plate in other formats, streamed from its file: Zarr, frames for fringe printers, GDSII.
+//! A finished plate in other formats, streamed from its file: Zarr, frames and bands for printers, shapes for mask writers.
 
+pub use super::format::Format;
 use super::plate::Raster;
 use super::reader::{Exported, Reader};
 use super::tiff::packed;
-use super::{gds, zarr};
+use super::{mask, zarr};
 use crate::error::{Error, Result};
 use crate::files;
-use crate::names::{Name, Named};
+use crate::names::Named;
 use crate::progress::Progress;
 use serde::Serialize;
 use std::path::Path;
 
-/// A format to export to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Zarr version 3, a shard for each tile; one bit is packed.
-    Zarr,
-    /// PNG frames.
-    Png,
-    /// BMP frames.
-    Bmp,
-    /// GDSII: a rectangle for each run of open pixels.
-    Gds,
-}
-
-impl Named for Format {
-    const KIND: &'static str = "format";
-    const NAMES: &'static [Name<Self>] = &[
-        ("zarr", || Self::Zarr, "Zarr version 3: a shard a tile, one bit packed"),
-        ("png", || Self::Png, "PNG frames"),
-        ("bmp", || Self::Bmp, "BMP frames"),
-        ("gds", || Self::Gds, "GDSII rectangles, for small masks"),
-    ];
-}
-
 /// How a plate is cut into exposures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Frames {
-    /// Columns and rows of a frame.
-    pub size: [u64; 2],
+    /// Columns and rows of a frame; none: those of the printer's field, where its plate has one.
+    pub size: Option<[u64; 2]>,
+    /// Rows of bands as wide as the plate, in place of frames.
+    pub band: Option<u64>,
     /// Pixels that neighbours share.
     pub overlap: u64,
     /// Whether every second row of frames runs from right to left.
@@ -47,27 +27,42 @@ pub struct Frames {
     pub window: bool,
 }
 
-/// Writes a finished plate in another format to `output`; pictures are cut into `frames`.
+/// Writes a finished plate in another format to `output`; pictures are cut into `frames`, shapes where that is asked for.
 ///
 /// # Errors
 /// Those of a plate that is missing, incomplete or damaged; [`Error::Parameter`] for a format that cannot hold it; [`Error::Io`].
-pub fn export(
-    folder: &Path,
-    format: Format,
-    frames: Option<&Frames>,
-    output: &Path,
-    progress: &Progress,
-) -> Result<Exported> {
+pub fn export(folder: &Path, format: Format, frames: &Frames, output: &Path, progress: &Progress) -> Result<Exported> {
     let mut reader = Reader::open(folder)?;
-    match format {
-        Format::Zarr => zarr::write(&mut reader, output, progress),
-        Format::Gds => gds::write(&mut reader, output, progress),
-        Format::Png | Format::Bmp => {
-            let frames = frames.ok_or_else(|| Error::parameter("frame", "the size of an exposure is needed"))?;
-            write_frames(&mut reader, frames, output, format, progress)
+    let Raster { width, height, .. } = reader.raster();
+    if format == Format::Zarr {
+        return zarr::write(&mut reader, output, progress);
+    }
+    if format.is_mask() {
+        mask::check(&reader, format, format.name())?;
+    }
+    let size = match (frames.size, frames.band) {
+        (Some(size), _) => Some(size),
+        (None, Some(rows)) => Some([width, rows]),
+        (None, None) if format.is_mask() => None,
+        (None, None) => reader.plate().printer.as_ref().and_then(|printer| printer.field),
+    };
+    match size {
+        Some(size) => write_frames(&mut reader, frames, size, output, format, progress),
+        None if format.is_mask() => {
+            let size = [width, height];
+            mask::check_size(format, format.name(), size)?;
+            progress.start("rectangles", 0);
+            let bytes = mask::write(&mut reader, format, [0; 2], size, output, progress)?;
+            Ok(Exported { files: 1, bytes })
         }
+        None => Err(Error::parameter("frame", "give the size of an exposure, --frame 1920x1080, or --band 2048")),
     }
 }
+
+/// Longest side of a frame [px]: a plate's.
+const LONGEST: u64 = 1 << 22;
+/// Pixels of a frame at most; one is held in memory.
+const MOST: u64 = 1 << 28;
 
 /// One exposure.
 #[derive(Serialize)]
@@ -84,17 +79,23 @@ struct Exposure {
 fn write_frames(
     reader: &mut Reader,
     frames: &Frames,
+    frame: [u64; 2],
     output: &Path,
     format: Format,
     progress: &Progress,
 ) -> Result<Exported> {
-    let [width, height] = frames.size;
+    let [width, height] = frame;
     let smallest = width.min(height);
-    if !(1..=65_535).contains(&width) || !(1..=65_535).contains(&height) || width * height > 1 << 28 {
-        return Err(Error::parameter(
-            "frame",
-            format!("{width}x{height}: sides of 1 to 65535, 268 million pixels at most"),
-        ));
+    if !(1..=LONGEST).contains(&width) || !(1..=LONGEST).contains(&height) || width * height > MOST {
+        let what =
+            format!("{width}x{height}: sides of 1 to {LONGEST}, {MOST} pixels at most; lower bands, smaller frames");
+        return Err(Error::parameter("frame", what));
+    }
+    if format.is_mask() {
+        mask::check_size(format, format.name(), frame)?;
+        if frames.overlap > 0 {
+            return Err(Error::parameter("overlap", "shapes of neighbouring files do not overlap; leave it out"));
+        }
     }
     if frames.overlap * 2 > smallest {
         return Err(Error::parameter("overlap", format!("{} is more than half of a frame", frames.overlap)));
@@ -120,20 +121,27 @@ fn write_frames(
             progress.check()?;
             let across = if frames.serpentine && down % 2 == 1 { counts[0] - 1 - i } else { i };
             let [column, row] = [across * step[0], down * step[1]];
-            let mut levels = reader.rectangle([column, row], frames.size)?;
-            if frames.window {
-                let first = [across == 0, down == 0];
-                let last = [across + 1 == counts[0], down + 1 == counts[1]];
-                window(&mut levels, frames, first, last);
-            }
-            let name = format!("frame-{down:05}-{across:05}.{}", format.name());
-            let bytes = match format {
-                Format::Bmp => bmp(&levels, frames.size, plate.fringe.bits, [pitch_x, pitch_y]),
-                _ => png_bytes(&levels, frames.size, plate.fringe.bits, [pitch_x, pitch_y], &output.join(&name))?,
-            };
-            files::write_bytes(&output.join(&name), &bytes)?;
+            let extension = if format == Format::Oasis { "oas" } else { format.name() };
+            let name = format!("frame-{down:05}-{across:05}.{extension}");
+            let path = output.join(&name);
             written.files += 1;
-            written.bytes += bytes.len() as u64;
+            written.bytes += if format.is_mask() {
+                let inside = [width.min(file_width - column), height.min(file_height - row)];
+                mask::write(reader, format, [column, row], inside, &path, progress)?
+            } else {
+                let mut levels = reader.rectangle([column, row], frame)?;
+                if frames.window {
+                    let first = [across == 0, down == 0];
+                    let last = [across + 1 == counts[0], down + 1 == counts[1]];
+                    window(&mut levels, frame, frames.overlap, first, last);
+                }
+                let bytes = match format {
+                    Format::Bmp => bmp(&levels, frame, plate.fringe.bits, [pitch_x, pitch_y]),
+                    _ => png_bytes(&levels, frame, plate.fringe.bits, [pitch_x, pitch_y], &path)?,
+                };
+                files::write_bytes(&path, &bytes)?;
+                bytes.len() as u64
+            };
             let middle = |from: u64, side: u64, whole: u64| from as f64 + 0.5 * side as f64 - 0.5 * whole as f64;
             exposures.push(Exposure {
                 file: name,
@@ -151,7 +159,7 @@ fn write_frames(
         "pitch": [pitch_x, pitch_y],
         "wavelength": plate.wavelength,
         "bits": plate.fringe.bits,
-        "frame": frames.size,
+        "frame": frame,
         "overlap": frames.overlap,
         "window": if frames.window { "linear" } else { "none" },
         "order": if frames.serpentine { "boustrophedon" } else { "rows" },
@@ -166,15 +174,14 @@ fn write_frames(
 }
 
 /// Lets levels fall towards edges that another frame overlaps; both ramps add up to one.
-fn window(levels: &mut [u8], frames: &Frames, first: [bool; 2], last: [bool; 2]) {
+fn window(levels: &mut [u8], [width, height]: [u64; 2], overlap: u64, first: [bool; 2], last: [bool; 2]) {
     let weight = |at: u64, side: u64, axis: usize| {
-        let from_low = (at as f64 + 0.5) / frames.overlap as f64;
-        let from_high = (side as f64 - at as f64 - 0.5) / frames.overlap as f64;
+        let from_low = (at as f64 + 0.5) / overlap as f64;
+        let from_high = (side as f64 - at as f64 - 0.5) / overlap as f64;
         let low = if first[axis] { 1.0 } else { from_low.min(1.0) };
         let high = if last[axis] { 1.0 } else { from_high.min(1.0) };
         low * high
     };
-    let [width, height] = frames.size;
     let across: Vec<f64> = (0..width).map(|c| weight(c, width, 0)).collect();
     for (row, line) in (0..height).zip(levels.chunks_exact_mut(width as usize)) {
         let down = weight(row, height, 1);

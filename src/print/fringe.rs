@@ -8,6 +8,7 @@
 
 use super::geometry::{border, fringe_area, plate_from_file, tile_in_file, tile_on_plate};
 use super::plate::{Binarisation, FringeSettings, Plate, Polarity};
+use super::transfer::edge_phase;
 use crate::encode::error_diffusion::binarise;
 use crate::encode::fringe::Fringe;
 use crate::error::Result;
@@ -36,15 +37,31 @@ impl PlateFringes {
             plate.fringe;
         let fringe = Fringe::new(quantity, amplitude, reference_ratio).with_swing(bias as f32, contrast as f32);
         let pulses = bits == 1 && binarisation == Binarisation::PulseWidth;
+        let (lines, tone) = match &plate.transfer {
+            None => (None, None),
+            Some(transfer) => (transfer.lines(&plate.fringe), transfer.tone(&plate.fringe)),
+        };
+        // Lines of the highest level are what is open, or what is closed.
+        let inwards = if polarity == Polarity::Negative { -1.0 } else { 1.0 };
         let mut out = vec![0.0; rect.area()];
         out.par_chunks_mut(rect.width()).zip(field.par_chunks(rect.width())).enumerate().for_each_init(
             Vec::new,
             |reference, (i, (out, field))| {
                 let row = rect.y[0] + i as i64;
-                plate.reference.row(grid, plate.wavelength_of(row), row, rect.x[0]..rect.x[1], reference);
-                for ((t, &u), &r) in out.iter_mut().zip(field).zip(reference.iter()) {
-                    let value = if pulses { fringe.pulse(u, r) } else { fringe.value(u, r).clamp(0.0, 1.0) };
-                    *t = if polarity == Polarity::Negative { 1.0 - value } else { value };
+                let wavelength = plate.wavelength_of(row);
+                plate.reference.row(grid, wavelength, row, rect.x[0]..rect.x[1], reference);
+                for (((t, &u), &r), column) in out.iter_mut().zip(field).zip(reference.iter()).zip(rect.x[0]..) {
+                    let value = match lines {
+                        Some(bias) => {
+                            let place = [grid.x(column as usize), grid.y(row as usize)];
+                            let edge = edge_phase(bias, plate.reference.frequency_at(place, wavelength));
+                            fringe.open_arc(u, pulses).open((u * r.conj()).arg(), (inwards * edge) as f32)
+                        }
+                        None if pulses => fringe.pulse(u, r),
+                        None => fringe.value(u, r).clamp(0.0, 1.0),
+                    };
+                    let value = if polarity == Polarity::Negative { 1.0 - value } else { value };
+                    *t = tone.as_ref().map_or(value, |tone| tone.level(value));
                 }
             },
         );

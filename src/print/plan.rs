@@ -11,6 +11,7 @@ use crate::field::Complex32;
 use crate::files;
 use crate::progress::Progress;
 use crate::segments::{Object, ObjectBand, Piece, Rect, Slit, Work};
+use crate::units::show_length;
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
@@ -286,6 +287,18 @@ fn warnings(fringes: &PlateFringes, plan: &Plan) -> Vec<String> {
                  steepen the reference along y, or make the slit lower or the strips higher",
                 mm(apart),
                 mm(lit)
+            ));
+        }
+    }
+    if let Some(smallest) = plate.printer.as_ref().and_then(|printer| printer.smallest) {
+        let [fx, fy] = plan.reference_frequencies.map(|[low, high]| low.abs().max(high.abs()));
+        // A line and a gap of the carrier.
+        let half = 0.5 / fx.hypot(fy).max(1e-9);
+        if half < smallest {
+            out.push(format!(
+                "the reference's fringes are lines of {}, and the printer's smallest are {}; take a smaller angle or another printer",
+                show_length(half),
+                show_length(smallest)
             ));
         }
     }

@@ -1,34 +1,13 @@
 //! A plate and all that decides its pixels.
 
+pub use super::fringe_settings::{Binarisation, FringeSettings, Polarity};
+use super::printer::Printer;
 use super::reference::Reference;
+use super::transfer::Transfer;
 pub use crate::encode::Quantity;
 use crate::field::Grid;
 use crate::segments::{Slit, Viewing};
 use serde::{Deserialize, Serialize};
-
-/// How a fringe becomes one bit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Binarisation {
-    /// Open where the fringe is above its middle.
-    Threshold,
-    /// Open where the phase of u·r* is within ±arcsin(|u|/A): the first order's amplitude follows |u| (Lee 1979).
-    PulseWidth,
-    /// Floyd–Steinberg error diffusion, begun in a halo outside of each tile.
-    #[default]
-    Diffusion,
-}
-
-/// Which level is clear.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Polarity {
-    /// The highest level is the brightest fringe.
-    #[default]
-    Positive,
-    /// The highest level is the darkest fringe.
-    Negative,
-}
 
 /// The pixels of a plate, as the viewer sees it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,27 +20,6 @@ pub struct Raster {
     pub pitch_x: f64,
     /// Distance of neighbouring rows [m].
     pub pitch_y: f64,
-}
-
-/// How object and reference become a pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FringeSettings {
-    /// What a pixel stands for.
-    pub quantity: Quantity,
-    /// Bits a pixel, 1 or 8.
-    pub bits: u8,
-    /// How one bit is made.
-    pub binarisation: Binarisation,
-    /// Level of a fringe without object light, 0 to 1.
-    pub bias: f64,
-    /// Factor on the fringe's swing about the bias.
-    pub contrast: f64,
-    /// The amplitude that swings fully is the one below which this share of the sampled pixels lies.
-    pub percentile: f64,
-    /// Amplitude of the reference over that of the object (intensity only).
-    pub reference_ratio: f64,
-    /// Which level is clear.
-    pub polarity: Polarity,
 }
 
 /// How the file shows the plate.
@@ -112,6 +70,12 @@ pub struct Plate {
     pub error: f64,
     /// Seed of phases, jitter and light.
     pub seed: u64,
+    /// The machine that prints it, where the profile tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub printer: Option<Printer>,
+    /// What that machine makes of levels and lines, where it was measured; it is undone in the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transfer: Option<Transfer>,
 }
 
 impl Raster {

@@ -70,6 +70,12 @@ impl Plate {
         if !(1..=16).contains(&self.view.rays) {
             return Err(format!("scene.rays = {} must be 1 to 16", self.view.rays));
         }
-        Ok(())
+        if let Some(printer) = &self.printer {
+            printer.check()?;
+        }
+        match &self.transfer {
+            Some(transfer) => transfer.check(&self.fringe),
+            None => Ok(()),
+        }
     }
 }

@@ -1,7 +1,10 @@
 //! Plates in TOML: a file of `calib/`, its keys, their units and their domains.
 
 use super::plate::{Binarisation, FileLayout, FringeSettings, Plate, Polarity, Quantity, Raster};
+use super::plate_size::{Asked, PlateSize, SizeKey, check_step};
+use super::printer::PrinterFile;
 use super::reference::{Reference, Side};
+use super::transfer::TransferFile;
 use crate::config::ConfigFile;
 use crate::error::{Error, Result};
 use crate::points::colour::Lasers;
@@ -14,11 +17,12 @@ use std::path::Path;
 #[serde(deny_unknown_fields)]
 struct PlateFile {
     name: String,
-    size: Option<[u64; 2]>,
+    size: Option<SizeKey>,
     extent: Option<[String; 2]>,
     pitch: Option<String>,
     pitch_x: Option<String>,
     pitch_y: Option<String>,
+    step: Option<String>,
     wavelength: String,
     #[serde(default)]
     quantity: Quantity,
@@ -45,6 +49,8 @@ struct PlateFile {
     seed: u64,
     reference: Option<ReferenceFile>,
     slit: Option<SlitFile>,
+    printer: Option<PrinterFile>,
+    transfer: Option<TransferFile>,
     scene: SceneFile,
 }
 
@@ -96,19 +102,36 @@ impl Plate {
     /// # Errors
     /// [`Error::Calibration`].
     pub fn parse(text: &str, source: &Path) -> Result<Self> {
+        Self::parse_as(text, source, &Asked::default())
+    }
+
+    /// The same with another size or pitch than the text's.
+    ///
+    /// # Errors
+    /// [`Error::Calibration`].
+    pub fn parse_as(text: &str, source: &Path, asked: &Asked) -> Result<Self> {
         let at = ConfigFile { source };
         let file: PlateFile = at.parse(text)?;
-        let [pitch_x, pitch_y] = at.pitches(&file.pitch, [&file.pitch_x, &file.pitch_y])?;
-        let [width, height] = match (file.size, &file.extent) {
-            (Some(size), None) => size,
-            (None, Some([x, y])) => {
-                let count = |text: &str, pitch: f64| -> Result<u64> {
-                    Ok((at.read("extent", text, units::positive_length)? / pitch).round() as u64)
-                };
-                [count(x, pitch_x)?, count(y, pitch_y)?]
+        let step = file.step.as_ref().map(|text| at.read("step", text, units::pitch)).transpose()?;
+        let [pitch_x, pitch_y] = match (asked.pitch, step) {
+            (Some(pitch), _) => [pitch; 2],
+            // Without another pitch the pixels are the printer's steps.
+            (None, Some(step)) if [&file.pitch, &file.pitch_x, &file.pitch_y].iter().all(|key| key.is_none()) => {
+                [step; 2]
             }
-            _ => return at.refuse("give either size = [columns, rows] or extent = [\"65mm\", \"65mm\"]"),
+            _ => at.pitches(&file.pitch, [&file.pitch_x, &file.pitch_y])?,
         };
+        let size = match (&file.size, &file.extent) {
+            (Some(size), None) => at.read("size", "", |_| size.size())?,
+            (None, Some([x, y])) => {
+                let side = |text: &String| at.read("extent", text, units::positive_length);
+                PlateSize::Lengths([side(x)?, side(y)?])
+            }
+            _ => return at.refuse("give either size = [columns, rows] or size = \"65mm x 65mm\""),
+        };
+        let [width, height] = asked.size.unwrap_or(size).pixels([pitch_x, pitch_y]);
+        let raster = Raster { width, height, pitch_x, pitch_y };
+        step.map_or(Ok(()), |step| check_step(&raster, step)).or_else(|what| at.refuse(what))?;
         if file.bits == 8 && file.binarisation.is_some() {
             return at.refuse("binarisation is for bits = 1; leave it out");
         }
@@ -117,7 +140,15 @@ impl Plate {
             return at.refuse("pulse-width makes its fringe from u·r* itself; take quantity = \"bipolar\"");
         }
         let tile = file.tile.unwrap_or(2048);
-        let segment = file.segment.unwrap_or(1024.min(tile));
+        let mut segment = file.segment.unwrap_or(1024.min(tile));
+        let mut layout =
+            FileLayout { mirror: file.mirror, rotation: file.rotation, guard: file.guard, marks: file.marks, tile };
+        if asked.size.is_some() {
+            // A plate that is made smaller than its file says gets tiles that fit.
+            layout.tile = tile.min(width.min(height) / 64 * 64).max(64);
+            segment = segment.min(layout.tile);
+        }
+        let tile = layout.tile;
         let reference = match &file.reference {
             None => Reference::None,
             Some(ReferenceFile { angle: Some([x, y]), point: None, side }) => Reference::Plane {
@@ -191,7 +222,7 @@ impl Plate {
         }
         let plate = Self {
             name: file.name,
-            raster: Raster { width, height, pitch_x, pitch_y },
+            raster,
             wavelength,
             reference,
             fringe: FringeSettings {
@@ -204,13 +235,7 @@ impl Plate {
                 reference_ratio: at.within("reference_ratio", file.reference_ratio.unwrap_or(1.0), 1e-3..=1e3)?,
                 polarity: file.polarity,
             },
-            file: FileLayout {
-                mirror: file.mirror,
-                rotation: file.rotation,
-                guard: file.guard,
-                marks: file.marks,
-                tile,
-            },
+            file: layout,
             segment,
             slit,
             view: Viewing {
@@ -226,6 +251,8 @@ impl Plate {
             object_angle,
             error: at.within("error", file.error.unwrap_or(if file.bits == 1 { 1e-2 } else { 5e-3 }), 1e-4..=0.1)?,
             seed: file.seed,
+            printer: file.printer.as_ref().map(|printer| printer.read(at)).transpose()?,
+            transfer: file.transfer.as_ref().map(|transfer| transfer.read(at)).transpose()?,
         };
         plate.check().map(|()| plate).or_else(|what| at.refuse(what))
     }
@@ -248,6 +275,19 @@ mod tests {
         assert!((grid.x(0) + 319.5e-6).abs() < 1e-15 && (grid.y(0) - 191.5e-6).abs() < 1e-15);
         let sized = SMALL.replace("size = [640, 384]", "extent = [\"0.64mm\", \"0.384mm\"]");
         assert_eq!(Plate::parse(&sized, Path::new("t.toml")).expect("plate"), plate);
+        for (from, to) in [
+            ("size = [640, 384]", "size = \"0.64mm x 0.384mm\""),
+            ("size = [640, 384]", "size = [\"640um\", \"384um\"]"),
+            ("pitch = \"1um\"", "step = \"1um\""),
+            ("pitch = \"1um\"", "pitch = \"25400dpi\"\nstep = \"0.5um\""),
+        ] {
+            let same = Plate::parse(&SMALL.replace(from, to), Path::new("t.toml")).expect(to);
+            assert_eq!((same.raster.width, same.raster.height), (640, 384), "{to}");
+            assert!((same.raster.pitch_x - 1e-6).abs() < 1e-20, "{to}");
+        }
+        let asked = Asked { size: Some(PlateSize::Lengths([0.2e-3, 0.1e-3])), pitch: Some(0.5e-6) };
+        let asked = Plate::parse_as(SMALL, Path::new("t.toml"), &asked).expect("plate");
+        assert_eq!((asked.raster.width, asked.raster.height, asked.file.tile, asked.segment), (400, 200, 128, 128));
         let oblong = SMALL.replace("pitch = \"1um\"", "pitch_x = \"1um\"\npitch_y = \"0.5um\"");
         let grid = Plate::parse(&oblong, Path::new("t.toml")).expect("plate").raster.grid();
         assert!((grid.extent_x() - 640e-6).abs() < 1e-15 && (grid.extent_y() - 192e-6).abs() < 1e-15);
@@ -273,6 +313,16 @@ mod tests {
             ("size = [640, 384]", "size = [640, 0]", "each side"),
             ("size = [640, 384]", "size = [9000000, 384]", "each side"),
             ("size = [640, 384]\n", "", "either size"),
+            ("size = [640, 384]", "size = [-1, 384]", "size: give pixels"),
+            ("size = [640, 384]", "size = \"0.64mm\"", "size: `0.64mm`"),
+            ("size = [640, 384]", "size = \"0.64 x 0.384\"", "no unit"),
+            ("size = [640, 384]", "size = \"0mm x 1mm\"", "greater than zero"),
+            ("size = [640, 384]", "size = \"NaNmm x 1mm\"", "size:"),
+            ("size = [640, 384]", "size = \"100m x 1mm\"", "each side"),
+            ("size = [640, 384]", "size = \"0.1um x 1mm\"", "0×1000 pixels"),
+            ("size = [640, 384]", "size = [640, 384]\nextent = [\"1mm\", \"1mm\"]", "either size"),
+            ("pitch = \"1um\"", "pitch = \"0dpi\"", "pitch"),
+            ("pitch = \"1um\"", "pitch = \"1um\"\nstep = \"0.4um\"", "800nm or 1.2um"),
             ("bits = 1", "bit = 1", "bit"),
         ] {
             let text = SMALL.replace(from, to);

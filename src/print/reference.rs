@@ -52,6 +52,19 @@ impl Reference {
         }
     }
 
+    /// Spatial frequency along x and y at a place of the plate [cycles/m].
+    pub(super) fn frequency_at(&self, [x, y]: [f64; 2], wavelength: f64) -> [f64; 2] {
+        match *self {
+            Self::None => [0.0; 2],
+            Self::Plane { angle, .. } => angle.map(|a| a.sin() / wavelength),
+            Self::Point { position: [px, py, pz] } => {
+                let (dx, dy) = (x - px, y - py);
+                let way = (dx * dx + dy * dy + pz * pz).sqrt() * wavelength;
+                [dx / way, dy / way]
+            }
+        }
+    }
+
     /// The wave of a wavelength [m] at columns `columns` of a row, unit amplitude.
     pub(super) fn row(
         &self,

@@ -3,6 +3,7 @@
 use super::panel::PanelArgs;
 use super::parse::{one_of, size};
 use crate::calibration::Order;
+use crate::print::calibrate::Scanner;
 use crate::units;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -30,6 +31,11 @@ pub(crate) enum CalibrateCommand {
         after_long_help = "Examples:\n  holodrive calibrate check --panel mine.toml -o cards\n  holodrive calibrate check --panel mine.toml --monitor HDMI-1 --hold 10 -o cards"
     )]
     Check(CheckArgs),
+    /// What a printer makes of a plate's levels and lines: without a scan the card to print, with it the profile that undoes it.
+    #[command(
+        after_long_help = "Examples:\n  holodrive calibrate plate --plate film-5080dpi -o card\n  holodrive calibrate plate scan.tif --plate film-5080dpi -o mine.toml\n  holodrive print cornell --plate mine.toml -o plate\n\nThe card's folder is that of a plate: `print export` writes it as the printer takes it. Scan all of it in transmission, 16 bit, at 20 pixels a patch or more, with the scanner's gamma, sharpening and colour management off; scale, turn and side do not matter."
+    )]
+    Plate(CalibratePlateArgs),
 }
 
 /// Where frames are shown beside being written.
@@ -135,4 +141,22 @@ pub(crate) struct CheckArgs {
     pub(crate) shown: ShownArgs,
     #[command(flatten)]
     pub(crate) panel: PanelArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CalibratePlateArgs {
+    /// The scan of the printed card (.tif, .png; 8 or 16 bit).
+    pub(crate) scan: Option<PathBuf>,
+    /// The plate whose printer it is: a built-in one by name (see `holodrive plates`), or a TOML file.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) plate: String,
+    /// Folder for the card [default: card], or the profile to write [default: calibrated-plate.toml].
+    #[arg(short, long, value_name = "PATH")]
+    pub(crate) output: Option<PathBuf>,
+    /// Side of a patch of the card [default: 1mm, or 192 pixels where these are more].
+    #[arg(long, value_parser = units::positive_length, value_name = "LENGTH", conflicts_with = "scan")]
+    pub(crate) patch: Option<f64>,
+    /// How the scanner's numbers follow the light.
+    #[arg(long, value_parser = one_of::<Scanner>(), default_value = "linear", value_name = "CODING")]
+    pub(crate) scanner: Scanner,
 }

@@ -22,7 +22,9 @@ mod viewer;
 mod views;
 
 pub(crate) use bench::{BenchCommand, BenchViewsArgs, EncodingsArgs, IterationsArgs};
-pub(crate) use calibrate::{CalibrateCommand, CameraArgs, CheckArgs, CurveArgs, FlatnessArgs, ShownArgs};
+pub(crate) use calibrate::{
+    CalibrateCommand, CalibratePlateArgs, CameraArgs, CheckArgs, CurveArgs, FlatnessArgs, ShownArgs,
+};
 pub(crate) use encoding::EncodingArgs;
 pub(crate) use field::FieldArgs;
 pub(crate) use groups::{Group, unused};
@@ -30,7 +32,7 @@ pub(crate) use hologram::HologramArgs;
 pub(crate) use manual::ManualArgs;
 pub(crate) use monitors::{DoctorArgs, MonitorsArgs};
 pub(crate) use panel::{ColorArgs, PanelArgs};
-pub(crate) use panels::PanelsArgs;
+pub(crate) use panels::{PanelsArgs, PlatesArgs};
 #[cfg(feature = "display")]
 pub(crate) use parse::Ahead;
 #[cfg(feature = "display")]
@@ -152,9 +154,9 @@ pub(crate) enum Command {
         after_long_help = "Examples:\n  holodrive show cornell\n  holodrive show cornell --eye-box 10mm,2mm --subframes 3\n  holodrive show cornell --wavelengths 638nm,520nm,450nm\n  holodrive show frame.png --monitor HDMI-1\n  holodrive show points.ply --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive show frames/ --monitor HDMI-1 --fps 30 --loop\n  holodrive show walk.glb --fps 12\n  holodrive show room.glb --monitor HDMI-1 --live\n  ffmpeg -i levels.mkv -f rawvideo -pix_fmt gray - | holodrive show - --raw 1920x1080 --monitor HDMI-1 --fps 24"
     )]
     Show(Box<ShowArgs>),
-    /// Find a panel's curve and wavefront error: frames to show, and what the measured numbers say.
+    /// Find a panel's curve and wavefront error, or a printer's tone and lines: what to show or print, and what was measured.
     #[command(
-        after_long_help = "Examples:\n  holodrive calibrate curve -o sweep\n  holodrive calibrate curve --powers sweep/manifest.csv -o mine.toml\n  holodrive calibrate flatness --zernike 0,0,0,0.8 --radius 6mm -o flat.npy --into mine.toml\n  holodrive calibrate check --panel mine.toml -o cards"
+        after_long_help = "Examples:\n  holodrive calibrate curve -o sweep\n  holodrive calibrate curve --powers sweep/manifest.csv -o mine.toml\n  holodrive calibrate flatness --zernike 0,0,0,0.8 --radius 6mm -o flat.npy --into mine.toml\n  holodrive calibrate check --panel mine.toml -o cards\n  holodrive calibrate plate --plate film-5080dpi -o card"
     )]
     Calibrate {
         /// What to find.
@@ -172,7 +174,7 @@ pub(crate) enum Command {
     },
     /// Print a hologram: fringes of a plate of any size, tile by tile into a file.
     #[command(
-        after_long_help = "Examples:\n  holodrive print cornell --plate calib/plate-chrome-1um.toml --dry-run\n  holodrive print cornell --plate calib/plate-small.toml -o plate\n  holodrive print cornell --plate calib/plate-chrome-1um.toml -o plate --shard auto"
+        after_long_help = "Examples:\n  holodrive print cornell --plate chrome-1um --dry-run\n  holodrive print cornell --plate small -o plate\n  holodrive print cornell --plate chrome-0.5um --size 60mm,40mm --dry-run\n  holodrive print cornell --plate mine.toml -o plate --shard auto"
     )]
     Print(PrintArgs),
     /// Keep a panel, and show on it what other programs send.
@@ -186,6 +188,9 @@ pub(crate) enum Command {
     /// List the built-in panel profiles, and which of their figures nobody has checked.
     #[command(after_long_help = "Examples:\n  holodrive panels\n  holodrive panels --json")]
     Panels(PanelsArgs),
+    /// List the built-in plates and their printers, and which of their figures nobody has checked.
+    #[command(after_long_help = "Examples:\n  holodrive plates\n  holodrive plates --json")]
+    Plates(PlatesArgs),
     /// Write man pages of all commands, and completions for bash, zsh, fish and PowerShell.
     ///
     /// Everything stands below the folder as it does below /usr/share: where that is ~/.local/share, man, bash and fish find it.

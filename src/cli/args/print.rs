@@ -2,6 +2,7 @@
 
 use super::parse::{White, one_of, part, position, size, white};
 use super::scene::FileArgs;
+use crate::print::PlateSize;
 use crate::print::export::Format;
 use crate::units;
 use clap::{Args, Subcommand};
@@ -15,9 +16,15 @@ pub(crate) struct PrintArgs {
     pub(crate) command: Option<PrintCommand>,
     /// A scene (.gltf, .glb, .obj, .stl), seen truly from each segment of the plate, or a point cloud (.ply, .xyz, .csv, .pcd, .las).
     pub(crate) input: Option<PathBuf>,
-    /// The plate: a TOML file, such as those of calib/ whose names begin with plate-.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) plate: Option<PathBuf>,
+    /// The plate: a built-in one by name (see `holodrive plates`), or a TOML file.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) plate: Option<String>,
+    /// Width and height of the plate in place of its own, each the nearest number of whole pixels, or pixels.
+    #[arg(long, value_parser = PlateSize::parse, value_name = "60mm,40mm|WxH")]
+    pub(crate) size: Option<PlateSize>,
+    /// Distance of its pixels in place of its own, or dots per inch.
+    #[arg(long, value_parser = units::pitch, value_name = "0.5um|5080dpi")]
+    pub(crate) pitch: Option<f64>,
     /// Folder for the plate. One that was begun with the same settings is gone on with; one of others is refused.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
@@ -60,7 +67,7 @@ pub(crate) enum PrintCommand {
     Preview(PreviewArgs),
     /// Write a finished plate in another format.
     #[command(
-        after_long_help = "Examples:\n  holodrive print export plate --as zarr -o plate.zarr\n  holodrive print export plate --as png --frame 1920x1080 --serpentine -o frames\n  holodrive print export plate --as gds -o plate.gds"
+        after_long_help = "Examples:\n  holodrive print export plate --as zarr -o plate.zarr\n  holodrive print export plate --as png --frame 1920x1080 --serpentine -o frames\n  holodrive print export plate --as bmp --band 2048 -o bands\n  holodrive print export plate --as gds -o plate.gds\n  holodrive print export plate --as oasis --frame 4096x4096 -o fields"
     )]
     Export(ExportArgs),
 }
@@ -114,12 +121,15 @@ pub(crate) struct ExportArgs {
     /// Format.
     #[arg(long = "as", value_parser = one_of::<Format>(), value_name = "FORMAT")]
     pub(crate) format: Format,
-    /// The folder to write, or the file for gds.
+    /// The folder to write; for gds, oasis and dxf without --frame or --band the file.
     #[arg(short, long, value_name = "PATH")]
     pub(crate) output: PathBuf,
-    /// png, bmp: columns and rows of an exposure.
+    /// Columns and rows of an exposure [default for png, bmp: the printer's field]; gds, oasis, dxf: of what goes into one file.
     #[arg(long, value_parser = size, value_name = "WxH")]
     pub(crate) frame: Option<(usize, usize)>,
+    /// Cut into bands of so many rows, as wide as the plate, in place of frames.
+    #[arg(long, value_name = "ROWS", conflicts_with = "frame")]
+    pub(crate) band: Option<u64>,
     /// png, bmp: pixels that neighbouring exposures share.
     #[arg(long, default_value_t = 0, value_name = "PIXELS")]
     pub(crate) overlap: u64,

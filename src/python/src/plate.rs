@@ -3,7 +3,7 @@
 use crate::errors::Raise;
 use crate::frame::loaded;
 use crate::run::run;
-use holodrive::print::{Plate, PlateJob, PrintSettings, Shard};
+use holodrive::print::{Asked, Plate, PlateJob, PrintSettings, Shard};
 use holodrive::segments::SceneOptions;
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 /// Computes the fringes of a plate of any size, tile by tile into one BigTIFF in `folder`; goes on where it was stopped.
 ///
 /// :param source: a scene (.gltf, .glb, .obj, .stl) or points (.ply).
-/// :param plate: the plate's .toml file: extent, pitch, reference wave, lamps.
+/// :param plate: a built-in plate's name (``holodrive plates``) or a .toml file: size, pitch, reference wave, lamps.
 /// :param folder: where the plate is written.
 /// :param dry_run: computes nothing and says what it would take.
 /// :param shard: part of the tiles, such as "0/8" for the first of eight.
@@ -33,7 +33,7 @@ pub(crate) fn print_plate(
         None => Shard::default(),
     };
     let told = run(py, progress, |progress| {
-        let plate = Plate::read(&plate)?;
+        let plate = Plate::find(&plate.to_string_lossy(), &Asked::default())?;
         let settings = PrintSettings { plate, input: source, options: SceneOptions::default(), folder, shard, dry_run };
         let mut job = PlateJob::new(settings, progress)?;
         let plan = job.plan(progress)?;
