@@ -61,7 +61,7 @@ enum Seen {
     /// The same about everywhere: the mean, and the least and most direct light of its places.
     Even(Place, [f32; 2]),
     /// Light differs from piece to piece.
-    Pieces([Place; PIECES]),
+    Pieces(Box<[Place; PIECES]>),
 }
 
 impl Patches {
@@ -150,7 +150,7 @@ impl Patches {
             for &(place, piece) in &places {
                 pieces[usize::from(piece)].push(look(leaf, place, places.len(), &mut random));
             }
-            *seen = Seen::Pieces(pieces.map(mean));
+            *seen = Seen::Pieces(Box::new(pieces.map(mean)));
         });
         progress.check()?;
         let senders = mesh.parted(&leaves, |number| matches!(seen[number], Seen::Pieces(_)));
@@ -168,7 +168,7 @@ impl Patches {
                     area.push(whole * leaf.part.share() as f32);
                 }
                 Seen::Pieces(pieces) => {
-                    found.extend(pieces);
+                    found.extend(pieces.iter());
                     area.extend([whole / PIECES as f32; PIECES]);
                 }
             }
