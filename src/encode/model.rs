@@ -2,9 +2,8 @@
 //! crosstalk and the wave that falls on it.
 
 use crate::error::{Error, Result};
-use crate::field::{Complex32, Complex64, Grid, angle, phasor};
-use crate::panel::crosstalk::{mixed, spread};
-use crate::panel::simulated::illuminate;
+use crate::field::{Complex32, Complex64, Grid, angle, phasor, zeroed};
+use crate::panel::simulated::{blurred, illuminate};
 use crate::panel::{DriveCurve, Illumination, Modulation, PanelProfile, Wavefront};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
@@ -121,18 +120,19 @@ impl PanelModel {
             (modulated + incident * self.dead, modulated)
         };
         let (total, modulated) = if self.crosstalk > 0.0 {
-            self.mixed(wishes).par_iter().enumerate().map(|(i, &u)| lit(i, u * self.fill)).unzip()
+            let phases = self.blended_phases(wishes);
+            phases.par_iter().enumerate().map(|(i, &p)| lit(i, phasor(p * (1.0 / TAU)) * self.fill)).unzip()
         } else {
             wishes.par_iter().enumerate().map(|(i, &wish)| lit(i, self.show(wish).1)).unzip()
         };
         Light { total, modulated }
     }
 
-    /// Phasors of the pixels where neighbours blend: the mean over each.
-    fn mixed(&self, wishes: &[f32]) -> Vec<Complex32> {
+    /// Phases that the panel shows where neighbours blend.
+    fn blended_phases(&self, wishes: &[f32]) -> Vec<f32> {
         let mut phases = vec![0.0f32; wishes.len()];
         phases.par_iter_mut().zip(wishes).for_each(|(phase, &wish)| *phase = self.show(wish).0);
-        mixed(&phases, self.grid.width, self.crosstalk, |phase| phasor(phase * (1.0 / TAU)))
+        blurred(&phases, self.grid.width, self.crosstalk)
     }
 
     /// The light of all pixels where neighbours blend, which no pixel's own wish tells; `None` without crosstalk.
@@ -140,8 +140,12 @@ impl PanelModel {
         if !self.blends() {
             return None;
         }
-        let mut light = self.mixed(wishes);
-        light.par_iter_mut().for_each(|u| *u = *u * self.fill + self.dead);
+        let phases = self.blended_phases(wishes);
+        let mut light = zeroed(wishes.len());
+        let width = self.grid.width;
+        light.par_chunks_mut(width).zip(phases.par_chunks(width)).for_each(|(light, phases)| {
+            light.iter_mut().zip(phases).for_each(|(u, &p)| *u = phasor(p * (1.0 / TAU)) * self.fill + self.dead);
+        });
         if let Some(wave) = &self.incident {
             light.par_iter_mut().zip(wave).for_each(|(u, wave)| *u *= wave);
         }
@@ -153,10 +157,9 @@ impl PanelModel {
         self.crosstalk > 0.0
     }
 
-    /// Slopes of what the panel shows as slopes of its pixels' wishes: crosstalk spreads each over its neighbours. The parts of
-    /// a pixel are taken for alike, which they are but beside wraps.
+    /// Slopes of what the panel shows as slopes of its pixels' wishes: crosstalk spreads each over its neighbours.
     pub(super) fn pulled_back(&self, slopes: Vec<f32>) -> Vec<f32> {
-        if self.crosstalk > 0.0 { spread(&slopes, self.grid.width, self.crosstalk) } else { slopes }
+        if self.crosstalk > 0.0 { blurred(&slopes, self.grid.width, self.crosstalk) } else { slopes }
     }
 
     /// The wish of pixel `i` whose light comes nearest to a wished light of any modulus, from the wish that it has and the

@@ -24,7 +24,6 @@
 
 mod beam;
 mod bounds;
-pub(crate) mod crosstalk;
 pub mod drive;
 mod drive_curve;
 mod embedded;
