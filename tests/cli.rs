@@ -367,12 +367,14 @@ fn help_is_short_or_has_examples_and_what_was_meant_is_told() {
         "calibrate flatness",
         "calibrate camera",
         "calibrate check",
+        "calibrate plate",
         "bench",
         "bench encodings",
         "bench views",
         "bench iterations",
         "serve",
         "panels",
+        "plates",
         "manual",
         "monitors",
         "doctor",
@@ -390,7 +392,11 @@ fn help_is_short_or_has_examples_and_what_was_meant_is_told() {
     }
     refused(f, &["shwo"], "did you mean `show`? (see holodrive --help)");
     refused(f, &["calibrate", "nonsense"], "(see holodrive calibrate --help)");
-    refused(f, &["calibrate"], "a command is needed: curve, flatness, camera, check (see holodrive calibrate --help)");
+    refused(
+        f,
+        &["calibrate"],
+        "a command is needed: curve, flatness, camera, check, plate (see holodrive calibrate --help)",
+    );
     refused(f, &["bench"], "encodings, views, iterations (see holodrive bench --help)");
     refused(f, &["show", "a.ply", "--wavelenght", "532nm"], "did you mean `--wavelength`? (see holodrive show --help)");
     refused(f, &["compute", "a.ply", "--engine", "plane"], "did you mean `planes`?");
