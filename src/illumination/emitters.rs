@@ -36,6 +36,8 @@ pub(crate) struct Emitters {
     polygon_of: Vec<u32>,
     /// Flux of each polygon and those before it, over that of all.
     reached: Vec<f64>,
+    /// Flux of all polygons and colours [W].
+    pub(crate) power: f64,
     pub(super) punctual: Vec<PunctualLight>,
     form_factor: FormFactor,
 }
@@ -97,9 +99,9 @@ impl Emitters {
         for emitter in &polygons {
             reached.push(reached.last().copied().unwrap_or(0.0) + emitter.power());
         }
-        let total = reached.last().copied().unwrap_or(1.0);
-        reached.iter_mut().for_each(|part| *part /= total);
-        Self { polygons, polygon_of, reached, punctual: scene.lights.clone(), form_factor }
+        let power = reached.last().copied().unwrap_or(0.0);
+        reached.iter_mut().for_each(|part| *part /= power);
+        Self { polygons, polygon_of, reached, power, punctual: scene.lights.clone(), form_factor }
     }
 
     /// The polygon through which a triangle's emission is sampled.
@@ -114,7 +116,7 @@ impl Emitters {
 
     /// How densely points of a polygon lie in the direction of `span` when polygons are drawn by flux and points by area [1/sr].
     pub(super) fn density(&self, emitter: &Emitter, span: DVec3) -> f64 {
-        let part = emitter.power() / self.polygons.iter().map(Emitter::power).sum::<f64>();
+        let part = emitter.power() / self.power;
         part * span.length_squared() * span.length() / (emitter.area * emitter.normal.dot(span).abs())
     }
 

@@ -10,7 +10,7 @@ use super::paths::Optics;
 use super::sampling::spread;
 use super::surface::Surface;
 use crate::random::Random;
-use crate::scene::bvh::{Hit, Ray};
+use crate::scene::bvh::Hit;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
@@ -20,16 +20,19 @@ const NARROW: f32 = 0.01;
 /// A ray into the lobe of a rough surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LobeRay {
+    /// Where it starts: thin walls that it passes change nothing [m].
+    from: DVec3,
     /// How densely the rays of its look lie about its direction, all together [1/sr].
     density: f64,
-    /// Points of lamps that were looked at from where it starts.
+    /// Points of lamps that were looked at from there.
     points: u32,
 }
 
 impl LobeRay {
-    /// One of `rays` into the lobe about the way back against `view`'s opposite, in a direction that was drawn.
+    /// One of `rays` into the lobe that `view` looks at, in a direction that was drawn.
     pub(crate) fn new(surface: &Surface, view: DVec3, drawn: DVec3, rays: u32) -> Self {
-        Self { density: f64::from(rays) * surface.density(view, drawn), points: points(surface, rays) }
+        let density = f64::from(rays) * surface.density(view, drawn);
+        Self { from: surface.position, density, points: points(surface, rays) }
     }
 }
 
@@ -77,10 +80,10 @@ impl Emitters {
     }
 
     /// The part of a lamp's light that a ray into a lobe counts where it meets one; all of it where no points of it are drawn.
-    pub(crate) fn part_of_lobe(&self, hit: &Hit, ray: &Ray, lobe: &LobeRay) -> f32 {
+    pub(crate) fn part_of_lobe(&self, hit: &Hit, lobe: &LobeRay) -> f32 {
         let drawn = lobe.points > 0 && lobe.density > 0.0;
         let Some(emitter) = self.polygon(hit.triangle).filter(|_| drawn) else { return 1.0 };
-        let by_points = f64::from(lobe.points) * self.density(emitter, hit.position - ray.origin);
+        let by_points = f64::from(lobe.points) * self.density(emitter, hit.position - lobe.from);
         (lobe.density / (lobe.density + by_points)) as f32
     }
 }

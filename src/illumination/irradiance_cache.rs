@@ -158,8 +158,8 @@ impl DiffuseLight for IrradianceCache<'_> {
         self.light.glints(surface, direction, rays, random)
     }
 
-    fn part_of_lobe(&self, hit: &Hit, ray: &Ray, lobe: &LobeRay) -> f32 {
-        self.light.part_of_lobe(hit, ray, lobe)
+    fn part_of_lobe(&self, hit: &Hit, lobe: &LobeRay) -> f32 {
+        self.light.part_of_lobe(hit, lobe)
     }
 }
 

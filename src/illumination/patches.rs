@@ -2,7 +2,6 @@
 
 use super::IlluminationSettings;
 use super::elements::{Elements, PIECES, Part, Sender, Senders};
-use super::emitter::Emitter;
 use super::emitters::{Emitters, ShadowRays, VisibleEmitters};
 use super::images::Images;
 use super::lamp_image::Lamps;
@@ -244,7 +243,7 @@ const RAYS_OF_EMITTERS: u32 = 1 << 16;
 /// Flux of emitters that leaves the scene without a diffuse surface on its way, and what ends on black or in optics before it
 /// comes to one [W].
 fn lost_from_emitters(around: &Surroundings, emitters: &Emitters, seed: u64) -> (Vec3, Vec3) {
-    let total: f64 = emitters.polygons.iter().map(Emitter::power).sum();
+    let total = emitters.power;
     if total <= 0.0 {
         return (Vec3::ZERO, Vec3::ZERO);
     }

@@ -30,7 +30,7 @@ pub(crate) trait DiffuseLight {
     fn glints(&self, surface: &Surface, direction: DVec3, rays: u32, random: &mut Random) -> Vec3;
 
     /// The part of what shines at a hit that is left to a ray into a lobe.
-    fn part_of_lobe(&self, hit: &Hit, ray: &Ray, lobe: &LobeRay) -> f32;
+    fn part_of_lobe(&self, hit: &Hit, lobe: &LobeRay) -> f32;
 }
 
 impl DiffuseLight for Illumination {
@@ -42,8 +42,8 @@ impl DiffuseLight for Illumination {
         self.emitters.glints(&self.optics, surface, direction, rays, random)
     }
 
-    fn part_of_lobe(&self, hit: &Hit, ray: &Ray, lobe: &LobeRay) -> f32 {
-        self.emitters.part_of_lobe(hit, ray, lobe)
+    fn part_of_lobe(&self, hit: &Hit, lobe: &LobeRay) -> f32 {
+        self.emitters.part_of_lobe(hit, lobe)
     }
 }
 

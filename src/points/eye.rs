@@ -251,7 +251,7 @@ impl<L: DiffuseLight> Looks<'_, L> {
         let glints = if glossy { self.light.glints(&surface, ray.direction, lobe, random) } else { Vec3::ZERO };
         if surface.is_diffuse() || (surface.emission + glints).max_element() > 0.0 {
             let shown = self.light.shown(&hit, &surface, footprint, branch.share, random);
-            let left = branch.lobe.map_or(1.0, |lobe| self.light.part_of_lobe(&hit, &ray, &lobe));
+            let left = branch.lobe.map_or(1.0, |lobe| self.light.part_of_lobe(&hit, &lobe));
             let radiance = branch.weight * (shown - surface.emission * (1.0 - left) + glints);
             let group = branch.group.unwrap_or_else(|| next(groups));
             let depth = self.depth(&branch);

@@ -7,7 +7,7 @@ use crate::illumination::test_rooms::{Room, glass};
 use crate::illumination::{Illumination, IlluminationSettings};
 use crate::progress::Progress;
 use crate::random::Random;
-use crate::scene::{Camera, Environment, LightKind, Material, PunctualLight, Scene, SceneBvh};
+use crate::scene::{AlphaMode, Camera, Environment, LightKind, Material, PunctualLight, Scene, SceneBvh};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -194,7 +194,7 @@ fn rough_metal_shows_all_of_its_lobe_and_the_glint_of_a_light_without_size() {
         });
         let (found, glint) = (seen(&room.scene), 2.0 * microfacets(view, towards, alpha, f0));
         assert!((found / glint - 1.0).abs() < 1e-3, "roughness {roughness}: {found}, not {glint}");
-        // Lamps, small and large: the integral over their surface.
+        // Lamps, small and large, behind a veil that covers nothing: the integral over their surface.
         room.scene.lights.clear();
         let (u, v) = towards.any_orthonormal_pair();
         let (u, v) = if u.cross(v).dot(towards) < 0.0 { (u, v) } else { (v, u) };
@@ -203,6 +203,9 @@ fn rough_metal_shows_all_of_its_lobe_and_the_glint_of_a_light_without_size() {
             let lamp = room.material(Material::emitter(Vec3::splat(3.0)));
             let corner = towards * 1.5 - (u + v) * (0.5 * size);
             room.quad(corner, u * size, v * size, lamp);
+            let clear = Material { alpha_mode: AlphaMode::Blend, alpha: 0.0, ..Material::diffuse(Vec3::ONE) };
+            let veil = room.material(clear);
+            room.quad(towards * 1.4 - (u + v), u * 2.0, v * 2.0, veil);
             let (n, mut whole) = (400, 0.0);
             for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
                 let [a, b] = [i, j].map(|k| size * (f64::from(k) + 0.5) / f64::from(n));
