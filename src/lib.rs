@@ -140,6 +140,7 @@
 //! 24. [`print`]: plates: fringes tile by tile into a file, resumed, shared, previewed
 //! 25. [`serve`]: frames from other programs: slmsuite's and slmPy's protocols, a local one for Python; the panel kept for them
 //! 26. [`display`]: monitors and the fullscreen window (feature `display`)
+//! 27. [`guide`]: what to do with the program, page by page
 //!
 //! On top of them stand two entrances that hold no physics: `cli`, the program, and the package for Python in `src/python`, a crate
 //! of its own, which starts the same program.
@@ -160,6 +161,7 @@ pub mod encode;
 pub mod error;
 pub mod field;
 pub mod files;
+pub mod guide;
 pub mod hologram;
 pub mod illumination;
 pub mod light_field;

@@ -509,9 +509,9 @@ fn serve_takes_frames_without_a_panel_and_refuses_in_one_line() {
     program.kill().expect("kill");
 }
 
-/// Commands in the README's `sh` blocks, in their order.
-fn readme_commands() -> Vec<String> {
-    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md");
+/// Commands in a page's `sh` blocks, in their order.
+fn commands_of(page: &str) -> Vec<String> {
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(page)).expect(page);
     let mut commands = Vec::new();
     let mut inside = false;
     for line in text.lines() {
@@ -524,8 +524,8 @@ fn readme_commands() -> Vec<String> {
     commands
 }
 
-#[test]
-fn every_command_of_the_readme_runs() {
+/// Runs a page's commands in a folder that has what a checkout has; `made` are files that they leave.
+fn every_command_runs(page: &str, least: usize, made: &[&str]) {
     let folder = tempfile::tempdir().expect("folder");
     let f = folder.path();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -536,37 +536,61 @@ fn every_command_of_the_readme_runs() {
             fs::copy(&path, f.join(name).join(path.file_name().expect("name"))).expect("copy");
         }
     }
-    let commands = readme_commands();
-    assert!(commands.len() >= 8, "{commands:?}");
+    let commands = commands_of(page);
+    assert!(commands.len() >= least, "{commands:?}");
     for command in commands {
         let words: Vec<&str> = command.split_whitespace().collect();
         let arguments = match words.as_slice() {
             ["holodrive", rest @ ..] | ["cargo", "run", "--release", "--", rest @ ..] => rest,
             // The test suite is not run inside itself.
             ["tests/run"] | ["cargo", "install", ..] => continue,
-            _ => panic!("README.md has a command that this test does not know: {command}"),
+            _ => panic!("{page} has a command that this test does not know: {command}"),
         };
         let out = holodrive(f, arguments);
-        assert!(out.status.success(), "{command}: {}", String::from_utf8_lossy(&out.stderr));
+        assert!(out.status.success(), "{page}: {command}: {}", String::from_utf8_lossy(&out.stderr));
     }
-    for name in
-        ["frame-red.png", "frame-green.png", "frame-blue.png", "overview.png", "seen-near.png", "wanted-near.png"]
-    {
-        assert!(f.join("colour").join(name).is_file(), "{name} is missing: {:?}", names(&f.join("colour")));
+    for name in made {
+        assert!(f.join(name).is_file(), "{page}: {name} is missing: {:?}", names(f));
     }
-    for name in ["box/frame-002.png", "box/sweep-focus.png", "box/sweep-eye.png", "seed/field.npy", "cornell.npz"] {
-        assert!(f.join(name).is_file(), "{name} is missing: {:?}", names(f));
-    }
-    for name in ["motion/contact.png", "motion/frames/frame-00003.png", "again/contact.png"] {
-        assert!(f.join(name).is_file(), "{name} is missing");
-    }
-    for name in
-        ["traced.png", "points.ply", "frame.png", "report.json", "overview.png", "seen-near.png", "seen-far.png"]
-    {
-        assert!(
-            f.join("holodrive-out").join(name).is_file(),
-            "{name} is missing: {:?}",
-            names(&f.join("holodrive-out"))
-        );
-    }
+}
+
+#[test]
+fn every_command_of_the_readme_runs() {
+    let made = [
+        "holodrive-out/traced.png",
+        "holodrive-out/points.ply",
+        "holodrive-out/frame.png",
+        "holodrive-out/report.json",
+        "holodrive-out/overview.png",
+        "holodrive-out/seen-near.png",
+        "holodrive-out/seen-far.png",
+        "seen/sweep-focus.png",
+        "seen/sweep-eye.png",
+        "preview.png",
+    ];
+    every_command_runs("README.md", 16, &made);
+}
+
+#[test]
+fn every_command_of_the_guide_for_an_eye_runs() {
+    let made = ["box/frame-002.png", "box/sweep-focus.png", "box/sweep-eye.png", "seed/field.npy", "cornell.npz"];
+    every_command_runs("src/guide/eye.md", 10, &made);
+}
+
+#[test]
+fn every_command_of_the_guide_to_scenes_runs() {
+    let colour = ["frame-red", "frame-green", "frame-blue", "overview", "seen-near", "wanted-near"];
+    let colour = colour.map(|name| format!("colour/{name}.png"));
+    every_command_runs("src/guide/scenes.md", 14, &colour.each_ref().map(String::as_str));
+}
+
+#[test]
+fn every_command_of_the_guide_to_the_lab_runs() {
+    let made = ["motion/contact.png", "motion/frames/frame-00003.png", "again/contact.png", "chart/far.png"];
+    every_command_runs("src/guide/lab.md", 10, &made);
+}
+
+#[test]
+fn every_command_of_the_guide_to_plates_runs() {
+    every_command_runs("src/guide/plates.md", 8, &["seen.png", "rainbow.png"]);
 }

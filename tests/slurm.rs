@@ -133,9 +133,9 @@ impl Cluster {
     }
 }
 
-/// The job script of the README.
+/// The job script of the guide.
 fn script() -> String {
-    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md");
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/guide/plates.md")).expect("the page");
     let block = text.split("```sh slurm\n").nth(1).expect("a job script").split("```").next().expect("its end");
     // Beside what a user runs: on which node each task runs, and as which process.
     block.replace("exec ", "echo $$ > $SLURMD_NODENAME-$SLURM_ARRAY_TASK_ID.pid\nexec ")

@@ -82,7 +82,7 @@ fn readme(desk: &Desk) -> Ended {
     let scene = Path::new("scenes/motion.gltf");
     let from = Path::new(env!("CARGO_MANIFEST_DIR")).join(scene);
     std::fs::copy(from, folder.path().join(scene)).expect("copy");
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md");
+    let text = pages();
     let mut inside = false;
     let mut run = 0;
     for line in text.lines() {
@@ -113,9 +113,15 @@ fn readme(desk: &Desk) -> Ended {
     Ended::Passed
 }
 
-/// The README's blocks of a kind, in their order.
+/// What is read of monitors: the README, and the guide to the lab.
+fn pages() -> String {
+    let page = |name| std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).expect(name);
+    ["README.md", "src/guide/lab.md"].map(page).concat()
+}
+
+/// Blocks of a kind in these pages, in their order.
 fn blocks(kind: &str) -> Vec<String> {
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md");
+    let text = pages();
     let mut blocks = Vec::new();
     let mut inside = false;
     for line in text.lines() {
@@ -159,7 +165,7 @@ fn python(desk: &Desk) -> Ended {
             served = Some(process);
         }
     }
-    let mut served = served.expect("the README serves a panel");
+    let mut served = served.expect("the guide serves a panel");
     let python = std::env::var("HOLODRIVE_PYTHON").unwrap_or_else(|_| "python3".into());
     let mut ended = Ended::Passed;
     let blocks = blocks("python");

@@ -1,4 +1,4 @@
-"""What documentation shows is so: doctests, the README's section, the notebook."""
+"""What documentation shows is so: doctests, the guide's page, the notebook."""
 
 from __future__ import annotations
 
@@ -57,24 +57,24 @@ def test_everything_public_is_documented(thing: Any) -> None:
         assert not missing, f"{thing.__name__} does not say what {missing} are"
 
 
-def readme() -> str:
-    text = (ROOT / "README.md").read_text()
-    return text[text.index("**From Python.**") :].split("\n**", 1)[0]
+PAGES = ["README.md", "src/guide/python.md"]
 
 
-def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("page", PAGES)
+def test_the_pages_python_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "scenes", tmp_path / "scenes")
-    blocks = re.findall(r"```python library\n(.*?)```", readme(), re.S)
-    assert blocks and len(readme().splitlines()) <= 40
+    blocks = re.findall(r"```python library\n(.*?)```", (ROOT / page).read_text(), re.S)
+    assert blocks
     names: "dict[str, Any]" = {}
     for block in blocks:
-        exec(compile(block, "README.md", "exec"), names)
+        exec(compile(block, page, "exec"), names)
     assert (tmp_path / "frame.png").exists() and (tmp_path / "near.png").exists()
 
 
-def test_the_readmes_commands_run(tmp_path: Path) -> None:
-    commands = [line for block in re.findall(r"```sh python\n(.*?)```", readme(), re.S) for line in block.splitlines()]
+def test_the_guides_commands_run(tmp_path: Path) -> None:
+    page = (ROOT / "src/guide/python.md").read_text()
+    commands = [line for block in re.findall(r"```sh python\n(.*?)```", page, re.S) for line in block.splitlines()]
     assert commands
     shutil.copytree(ROOT / "scenes", tmp_path / "scenes")
     for command in commands:

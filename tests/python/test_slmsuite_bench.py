@@ -345,15 +345,15 @@ def test_a_full_panel_is_photographed_quickly_and_right() -> None:
     assert np.abs(np.sqrt(seen[[j for _, j in pixels], [i for i, _ in pixels]]) - np.sqrt(wanted)).max() < 2e-6
 
 
-def test_the_readmes_bench_is_calibrated() -> None:
+def test_the_guides_bench_is_calibrated() -> None:
     """1920 × 1080, over the local path."""
-    block = re.search(r"```python slmsuite\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+    block = re.search(r"```python slmsuite\n(.*?)```", (ROOT / "src/guide/python.md").read_text(), re.S)
     assert block
     # A name of its own: a panel of that name may be served on this machine.
-    code = block[1].replace('"generic", ', '"generic", name="bench of the README", ')
+    code = block[1].replace('"generic", ', '"generic", name="bench of the guide", ')
     names: "dict[str, Any]" = {}
     np.random.seed(1)
-    exec(compile(code, "README.md", "exec"), names)
+    exec(compile(code, "python.md", "exec"), names)
     try:
         assert misplaced(names["bench"], names["camera"]) < 0.2
     finally:
