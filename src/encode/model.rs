@@ -2,8 +2,9 @@
 //! crosstalk and the wave that falls on it.
 
 use crate::error::{Error, Result};
-use crate::field::{Complex32, Complex64, Grid, angle, phasor, zeroed};
-use crate::panel::simulated::{blurred, illuminate};
+use crate::field::{Complex32, Complex64, Grid, angle, phasor};
+use crate::panel::crosstalk::{mixed, mixed_slopes};
+use crate::panel::simulated::illuminate;
 use crate::panel::{DriveCurve, Illumination, Modulation, PanelProfile, Wavefront};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
@@ -120,19 +121,21 @@ impl PanelModel {
             (modulated + incident * self.dead, modulated)
         };
         let (total, modulated) = if self.crosstalk > 0.0 {
-            let phases = self.blended_phases(wishes);
-            phases.par_iter().enumerate().map(|(i, &p)| lit(i, phasor(p * (1.0 / TAU)) * self.fill)).unzip()
+            self.mixed(wishes).par_iter().enumerate().map(|(i, &u)| lit(i, u * self.fill)).unzip()
         } else {
             wishes.par_iter().enumerate().map(|(i, &wish)| lit(i, self.show(wish).1)).unzip()
         };
         Light { total, modulated }
     }
 
-    /// Phases that the panel shows where neighbours blend.
-    fn blended_phases(&self, wishes: &[f32]) -> Vec<f32> {
-        let mut phases = vec![0.0f32; wishes.len()];
-        phases.par_iter_mut().zip(wishes).for_each(|(phase, &wish)| *phase = self.show(wish).0);
-        blurred(&phases, self.grid.width, self.crosstalk)
+    /// Phases of the levels that the panel shows for wishes.
+    fn phases(&self, wishes: &[f32]) -> Vec<f32> {
+        wishes.par_iter().map(|&wish| self.show(wish).0).collect()
+    }
+
+    /// Phasors of the pixels where neighbours blend: the mean over each.
+    fn mixed(&self, wishes: &[f32]) -> Vec<Complex32> {
+        mixed(&self.phases(wishes), self.grid.width, self.crosstalk, |phase| phasor(phase * (1.0 / TAU)))
     }
 
     /// The light of all pixels where neighbours blend, which no pixel's own wish tells; `None` without crosstalk.
@@ -140,12 +143,8 @@ impl PanelModel {
         if !self.blends() {
             return None;
         }
-        let phases = self.blended_phases(wishes);
-        let mut light = zeroed(wishes.len());
-        let width = self.grid.width;
-        light.par_chunks_mut(width).zip(phases.par_chunks(width)).for_each(|(light, phases)| {
-            light.iter_mut().zip(phases).for_each(|(u, &p)| *u = phasor(p * (1.0 / TAU)) * self.fill + self.dead);
-        });
+        let mut light = self.mixed(wishes);
+        light.par_iter_mut().for_each(|u| *u = *u * self.fill + self.dead);
         if let Some(wave) = &self.incident {
             light.par_iter_mut().zip(wave).for_each(|(u, wave)| *u *= wave);
         }
@@ -157,9 +156,23 @@ impl PanelModel {
         self.crosstalk > 0.0
     }
 
-    /// Slopes of what the panel shows as slopes of its pixels' wishes: crosstalk spreads each over its neighbours.
-    pub(super) fn pulled_back(&self, slopes: Vec<f32>) -> Vec<f32> {
-        if self.crosstalk > 0.0 { blurred(&slopes, self.grid.width, self.crosstalk) } else { slopes }
+    /// ∂L/∂wish of all pixels where A*·∂L/∂U* is given; `modulated` is the light of these wishes that turns with them.
+    pub(super) fn slopes(&self, wishes: &[f32], pulled: &[Complex32], modulated: &[Complex32]) -> Vec<f32> {
+        if self.blends() {
+            return self.blended_slopes(wishes, pulled.to_vec());
+        }
+        pulled.par_iter().zip(modulated).map(|(pulled, u)| slope(*pulled, *u)).collect()
+    }
+
+    /// The same where neighbours blend, through all places of a pixel.
+    pub(super) fn blended_slopes(&self, wishes: &[f32], mut pulled: Vec<Complex32>) -> Vec<f32> {
+        let fill = self.fill;
+        match &self.incident {
+            // conj(p)·w·F·exp(iφ) is conj(p·conj(w)·F)·exp(iφ).
+            Some(wave) => pulled.par_iter_mut().zip(wave).for_each(|(p, w)| *p *= w.conj() * fill),
+            None => pulled.par_iter_mut().for_each(|p| *p *= fill),
+        }
+        mixed_slopes(&self.phases(wishes), self.grid.width, self.crosstalk, &pulled)
     }
 
     /// The wish of pixel `i` whose light comes nearest to a wished light of any modulus, from the wish that it has and the
@@ -190,6 +203,11 @@ impl PanelModel {
             phases.par_iter_mut().for_each(|phase| *phase = range.nearest(*phase));
         }
     }
+}
+
+/// ∂L/∂φ of one pixel whose modulated light is given.
+pub(super) fn slope(pulled: Complex32, modulated: Complex32) -> f32 {
+    -2.0 * (pulled.conj() * modulated).im
 }
 
 /// The range of a panel whose phases leave a gap on the circle, wider than eight steps of its levels.

@@ -24,6 +24,7 @@
 
 mod beam;
 mod bounds;
+pub(crate) mod crosstalk;
 pub mod drive;
 mod drive_curve;
 mod embedded;

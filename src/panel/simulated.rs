@@ -7,6 +7,7 @@
 //! sinc weights; nothing is folded back from above. (Samples of the bare rectangles would fold: at n = 4 and F = 0.93
 //! the first order comes out 30 % too weak.)
 
+use super::crosstalk::{blurred, mixed};
 use super::drive_curve::Modulation;
 use super::frame::{Frame, Illumination};
 use super::regional::PixelCurve;
@@ -108,11 +109,18 @@ pub fn simulate(frame: &Frame, settings: &Simulation, progress: &Progress) -> Re
     let crosstalk = faults.crosstalk.hypot(profile.crosstalk);
     let cells = if crosstalk > 0.0 { n } else { 1 };
     progress.start("simulated panel", (cells * cells + 1) as u64);
-    let values = cell_values(frame, &curve, cells, faults, crosstalk)?;
+    // With one sample a pixel its parts, each with the phase that it has there, are mixed as the rest is.
+    let values = cell_values(frame, &curve, cells, faults, if n > 1 { crosstalk } else { 0.0 })?;
     let modulate = |value: f32| modulated(value, curve.modulation(), faults);
     let mut samples = if n == 1 {
         let fill = profile.fill_factor as f32;
-        values.par_iter().map(|&v| modulate(v) * fill + dead * (1.0 - fill)).collect()
+        let mut mixed: Vec<Complex32> = if crosstalk > 0.0 {
+            mixed(&values, frame.width, crosstalk, modulate)
+        } else {
+            values.par_iter().map(|&v| modulate(v)).collect()
+        };
+        mixed.par_iter_mut().for_each(|u| *u = *u * fill + dead * (1.0 - fill));
+        mixed
     } else {
         let pixel = PixelGeometry { cells, subsamples: n, side: profile.fill_factor.sqrt(), dead };
         band_limited(&values, grid, &pixel, modulate, progress)?
@@ -211,53 +219,6 @@ fn cell_values(frame: &Frame, curve: &PixelCurve, cells: usize, faults: &Faults,
         }
     });
     Ok(if crosstalk > 0.0 { blurred(&values, width, crosstalk * cells as f64) } else { values })
-}
-
-/// Values of an array of that width blended by a Gaussian of standard deviation `sigma` [samples]; beyond the border the
-/// border's values go on.
-pub(crate) fn blurred(values: &[f32], width: usize, sigma: f64) -> Vec<f32> {
-    let kernel = gaussian(sigma);
-    let (reach, height) = (kernel.len() - 1, values.len() / width);
-    let mut rows = vec![0.0; values.len()];
-    rows.par_chunks_mut(width).zip(values.par_chunks(width)).for_each_init(
-        || vec![0.0f32; width + 2 * reach],
-        |wide, (out, row)| {
-            wide[..reach].fill(row[0]);
-            wide[reach..reach + width].copy_from_slice(row);
-            wide[reach + width..].fill(row[width - 1]);
-            for (k, &weight) in kernel.iter().enumerate() {
-                add_both(out, weight, [&wide[reach - k..][..width], &wide[reach + k..][..width]], k == 0);
-            }
-        },
-    );
-    let mut out = vec![0.0; values.len()];
-    out.par_chunks_mut(width).enumerate().for_each(|(row, out)| {
-        for (k, &weight) in kernel.iter().enumerate() {
-            let line = |row: usize| &rows[row * width..][..width];
-            add_both(out, weight, [line(row.saturating_sub(k)), line((row + k).min(height - 1))], k == 0);
-        }
-    });
-    out
-}
-
-/// Adds a weight's share of the values on both sides; of the middle once, in place of what there is.
-fn add_both(out: &mut [f32], weight: f32, [before, after]: [&[f32]; 2], is_middle: bool) {
-    if is_middle {
-        out.iter_mut().zip(before).for_each(|(out, v)| *out = weight * v);
-    } else {
-        out.iter_mut().zip(before.iter().zip(after)).for_each(|(out, (a, b))| *out += weight * (a + b));
-    }
-}
-
-/// Half of a Gaussian's weights, integrated over cells: weight i is the share that lands i cells away; sums to one with
-/// its mirror image.
-fn gaussian(sigma: f64) -> Vec<f32> {
-    // Beyond five standard deviations 6e-7 of the weight is left.
-    let reach = (5.0 * sigma).ceil() as usize + 1;
-    let integral = |x: f64| 0.5 * libm::erf(x / (sigma * std::f64::consts::SQRT_2));
-    let weights: Vec<f64> = (0..=reach).map(|i| integral(i as f64 + 0.5) - integral(i as f64 - 0.5)).collect();
-    let sum = 2.0 * weights.iter().sum::<f64>() - weights[0];
-    weights.iter().map(|w| (w / sum) as f32).collect()
 }
 
 /// What a cell of that phase [rad] or amplitude does to unit light.

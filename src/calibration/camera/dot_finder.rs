@@ -4,7 +4,7 @@ use super::dot_card::{dots, spacing};
 use super::mapping::Mapping;
 use super::photo::CameraPhoto;
 use crate::error::{Error, Result};
-use crate::panel::simulated::blurred;
+use crate::panel::crosstalk::blurred;
 use crate::random::Random;
 
 /// Most spots of a photo that are looked at.

@@ -2,6 +2,7 @@
 
 use super::shapes::{Products, legendre_lines, level_shapes, place};
 use crate::field::{Complex32, phasor};
+use crate::panel::crosstalk::{mixed, spread};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
@@ -13,8 +14,6 @@ pub(super) const WAVE_DEGREE: usize = 6;
 pub(super) const CURVE: usize = 5;
 /// Degree over the panel of each one's share.
 pub(super) const CURVE_DEGREE: usize = 2;
-/// Places along each side of a pixel at which its phase is taken: neighbours' fields reach into it.
-const SUB: usize = 3;
 
 /// A panel's pixels, and the functions over them.
 #[derive(Clone, Debug)]
@@ -92,55 +91,11 @@ impl PanelLight {
     /// A function of the level at each pixel, blended over its neighbours by the crosstalk.
     pub(super) fn shape(&self, m: usize, levels: &[u16], crosstalk: f64) -> Vec<f32> {
         let values: Vec<f32> = levels.par_iter().map(|&level| self.shapes[usize::from(level)][m]).collect();
-        crate::panel::simulated::blurred(&values, self.width, crosstalk.max(0.02))
+        spread(&values, self.width, crosstalk)
     }
 
     /// The mean of exp(iφ) over each pixel, φ the pixels' phases blended by a Gaussian of that standard deviation [pixels].
     pub(super) fn blended(&self, phases: &[f32], crosstalk: f64) -> Vec<Complex32> {
-        let weights = weights(crosstalk);
-        let reach = weights[0].len() / 2;
-        let (width, height) = (self.width, self.height);
-        let mut out = vec![Complex32::new(0.0, 0.0); phases.len()];
-        let share = 1.0 / (SUB * SUB) as f32;
-        out.par_chunks_mut(width).enumerate().for_each_init(
-            || vec![0.0f32; width + 2 * reach],
-            |line, (row, out)| {
-                for wy in &weights {
-                    line.fill(0.0);
-                    for (t, weight) in wy.iter().enumerate() {
-                        let from = (row + t).saturating_sub(reach).min(height - 1);
-                        let source = &phases[from * width..][..width];
-                        line[reach..reach + width].iter_mut().zip(source).for_each(|(v, p)| *v += weight * p);
-                    }
-                    let (first, last) = (line[reach], line[reach + width - 1]);
-                    line[..reach].fill(first);
-                    line[reach + width..].fill(last);
-                    line.iter_mut().for_each(|v| *v *= 1.0 / TAU);
-                    for wx in &weights {
-                        for (i, u) in out.iter_mut().enumerate() {
-                            let turns: f32 = wx.iter().zip(&line[i..]).map(|(w, v)| w * v).sum();
-                            *u += phasor(turns) * share;
-                        }
-                    }
-                }
-            },
-        );
-        out
+        mixed(phases, self.width, crosstalk, |phase| phasor(phase * (1.0 / TAU)))
     }
-}
-
-/// For each place within a pixel: the shares of the pixel and its neighbours there.
-fn weights(crosstalk: f64) -> Vec<Vec<f32>> {
-    let sigma = crosstalk.max(0.02);
-    let reach = (3.5 * sigma + 0.5).ceil() as i32;
-    let below = |x: f64| 0.5 * libm::erf(x / (sigma * std::f64::consts::SQRT_2));
-    (0..SUB)
-        .map(|s| {
-            let at = (s as f64 + 0.5) / SUB as f64 - 0.5;
-            let all: Vec<f64> =
-                (-reach..=reach).map(|k| below(f64::from(k) + 0.5 - at) - below(f64::from(k) - 0.5 - at)).collect();
-            let sum: f64 = all.iter().sum();
-            all.iter().map(|w| (w / sum) as f32).collect()
-        })
-        .collect()
 }

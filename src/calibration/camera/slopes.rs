@@ -38,7 +38,7 @@ pub(super) struct Start {
 
 /// Contrast of a picture against its own blurred self, limited against the zero order.
 fn contrast(values: &[f32], width: usize) -> Vec<Complex32> {
-    let mean = crate::panel::simulated::blurred(values, width, 6.0);
+    let mean = crate::panel::crosstalk::blurred(values, width, 6.0);
     let floor = 0.1 * values.iter().sum::<f32>() / values.len() as f32 + f32::MIN_POSITIVE;
     values.iter().zip(&mean).map(|(v, m)| Complex32::new(((v - m) / m.max(floor)).clamp(-1.0, 3.0), 0.0)).collect()
 }

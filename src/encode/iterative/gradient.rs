@@ -7,7 +7,7 @@
 //! of the range: in the gap it would move without effect and jump from one end to the other.
 
 use super::{Judged, Padding, Problem, Solution, Start, Target};
-use crate::encode::model::{Light, PanelModel, Range};
+use crate::encode::model::{PanelModel, Range};
 use crate::error::{Error, Result};
 use crate::field::Complex32;
 use crate::panel::{Illumination, PanelProfile};
@@ -67,7 +67,7 @@ pub fn gradient_descent(
     let mut light = model.light(&wish);
     let mut judged = problem.judge(&light.total)?;
     let mut adam = Adam::new(wish.len());
-    adam.turn(&slopes(&model, &gradient_field(&problem, &judged)?, &light));
+    adam.turn(&model.slopes(&wish, &gradient_field(&problem, &judged)?, &light.modulated));
     let mut history = vec![judged.error];
     let (mut rejected, mut trust) = (0, 1.0);
     for iteration in 0..settings.iterations {
@@ -82,7 +82,7 @@ pub fn gradient_descent(
             (wish, light, judged) = (next, next_light, next_judged);
             trust = f64::min(1.0, 1.1 * trust);
             if iteration + 1 < settings.iterations {
-                adam.turn(&slopes(&model, &gradient_field(&problem, &judged)?, &light));
+                adam.turn(&model.slopes(&wish, &gradient_field(&problem, &judged)?, &light.modulated));
             }
         } else {
             rejected += 1;
@@ -123,17 +123,6 @@ pub(super) fn gradient_field(problem: &Problem<'_>, judged: &Judged) -> Result<V
         }
     }
     Ok(sum.unwrap_or_default())
-}
-
-/// ∂L/∂wish of all pixels.
-pub(super) fn slopes(model: &PanelModel, pulled: &[Complex32], light: &Light) -> Vec<f32> {
-    let each = pulled.par_iter().zip(&light.modulated).map(|(pulled, modulated)| slope(*pulled, *modulated));
-    model.pulled_back(each.collect())
-}
-
-/// ∂L/∂φ of one pixel whose modulated light is given.
-pub(super) fn slope(pulled: Complex32, modulated: Complex32) -> f32 {
-    -2.0 * (pulled.conj() * modulated).im
 }
 
 /// Adam's moments of every pixel's slope.

@@ -7,7 +7,7 @@
 //! each. Levels, range, dead space and crosstalk stand inside: the light is that of the level that the panel would show, its
 //! derivative moves the wish ("straight through", Bengio et al., arXiv:1308.3432).
 
-use crate::encode::model::{PanelModel, Range};
+use crate::encode::model::{PanelModel, Range, slope};
 use crate::error::Result;
 use crate::field::Complex32;
 use crate::light_field::Look;
@@ -105,8 +105,6 @@ pub(super) struct Found {
 
 /// What the pupils see of all frames together.
 struct Seen {
-    /// The light of each frame's pixels where neighbours blend.
-    blended: Vec<Option<Vec<Complex32>>>,
     /// Field on the retina, by frame and look.
     fields: Vec<Vec<Vec<Complex32>>>,
     /// a, by look.
@@ -175,7 +173,7 @@ impl<S: Sight> Problem<'_, S> {
     fn look(&self, frames: &[Frame], looks: &[&S::Ready]) -> Result<Seen> {
         let mut amplitudes: Vec<Vec<f32>> = looks.iter().map(|look| vec![0.0; self.sight.wanted(look).len()]).collect();
         let share = 1.0 / frames.len() as f32;
-        let (mut fields, mut blended) = (Vec::with_capacity(frames.len()), Vec::with_capacity(frames.len()));
+        let mut fields = Vec::with_capacity(frames.len());
         for frame in frames {
             let light = self.model.blended(&frame.wish);
             self.progress.check()?;
@@ -187,7 +185,6 @@ impl<S: Sight> Problem<'_, S> {
                 .zip(&seen)
                 .for_each(|((sum, look), seen)| self.sight.expose(look, seen, share, sum));
             fields.push(seen);
-            blended.push(light);
             self.progress.check()?;
         }
         // Sums of each look in its own order, so that threads do not matter.
@@ -212,7 +209,7 @@ impl<S: Sight> Problem<'_, S> {
         let [aa, at, tt, all] = sums.iter().fold([0.0; 4], |sum, one| [0, 1, 2, 3].map(|i| sum[i] + one[i]));
         let scale = if aa > 0.0 { at / aa } else { 0.0 };
         let loss = (tt - scale * at).max(0.0) / all.max(f64::MIN_POSITIVE);
-        Ok(Seen { blended, fields, amplitudes, scale, loss })
+        Ok(Seen { fields, amplitudes, scale, loss })
     }
 
     fn fields(&self, wish: &[f32], blended: Option<&[Complex32]>, looks: &[&S::Ready]) -> Vec<Vec<Complex32>> {
@@ -233,7 +230,7 @@ impl<S: Sight> Problem<'_, S> {
 
     /// One step of all frames.
     fn step(&self, frames: &mut [Frame], looks: &[&S::Ready], settings: &Descent, iteration: usize) -> Result<()> {
-        let Seen { blended, fields, mut amplitudes, scale, loss } = self.look(frames, looks)?;
+        let Seen { fields, mut amplitudes, scale, loss } = self.look(frames, looks)?;
         let scale = scale as f32;
         // Slopes fall with the root of the loss; divided by it they weigh alike in Adam's means.
         let even = (1.0 / loss.sqrt().max(1e-6)) as f32;
@@ -244,56 +241,48 @@ impl<S: Sight> Problem<'_, S> {
             seen.iter_mut().zip(self.sight.weights(look)).for_each(|(pull, weight)| *pull *= weight);
         });
         let adam = Adam::at(settings, iteration, self.model.range);
-        for ((frame, mut seen), blended) in frames.iter_mut().zip(fields).zip(blended) {
+        for (frame, mut seen) in frames.iter_mut().zip(fields) {
             self.progress.check()?;
             let pulls: Vec<(&S::Ready, Vec<Complex32>)> = seen
                 .par_iter_mut()
                 .enumerate()
                 .map(|(k, field)| (looks[k], self.sight.pulled(looks[k], std::mem::take(field), &amplitudes[k])))
                 .collect();
-            self.move_frame(frame, blended, pulls, &adam);
+            self.move_frame(frame, pulls, &adam);
             self.progress.check()?;
         }
         Ok(())
     }
 
-    fn move_frame(
-        &self,
-        frame: &mut Frame,
-        blended: Option<Vec<Complex32>>,
-        pulls: Vec<(&S::Ready, Vec<Complex32>)>,
-        adam: &Adam,
-    ) {
+    fn move_frame(&self, frame: &mut Frame, pulls: Vec<(&S::Ready, Vec<Complex32>)>, adam: &Adam) {
         let width = self.model.grid.width;
-        let (incident, one) = (self.model.incident.as_ref(), Complex32::new(1.0, 0.0));
         let Frame { wish, moments: [first, second] } = frame;
-        let slope = |pulled: &Complex32, light: Complex32| -2.0 * (pulled.conj() * light).im;
+        if self.model.blends() {
+            // A pixel's slope takes its neighbours', so that all of the pull must be there first.
+            let mut pull = vec![Complex32::default(); wish.len()];
+            let mut rows: Vec<&mut [Complex32]> = pull.chunks_mut(width).collect();
+            let keep = |_: usize, row: &mut &mut [Complex32], pulled: &[Complex32]| row.copy_from_slice(pulled);
+            self.sight.slopes(pulls, &mut rows, keep, self.progress);
+            let slopes = self.model.blended_slopes(wish, pull);
+            let cells = wish.par_iter_mut().zip(first).zip(second).zip(&slopes);
+            cells.for_each(|(((wish, first), second), slope)| adam.turn(wish, first, second, *slope));
+            return;
+        }
+        let incident = self.model.incident.as_ref();
         let rows = wish.chunks_mut(width).zip(first.chunks_mut(width)).zip(second.chunks_mut(width));
         let mut rows: Vec<_> = rows.collect();
         type Row<'r> = ((&'r mut [f32], &'r mut [f32]), &'r mut [f32]);
         let take = |row: usize, ((wish, first), second): &mut Row, pulled: &[Complex32]| {
             let cells = wish.iter_mut().zip(first.iter_mut()).zip(second.iter_mut()).zip(pulled);
-            if let Some(light) = &blended {
-                // Slopes by the phases that the panel shows. Those by the wishes are these blended once more; without that
-                // the way still leads down, since a Gaussian has no negative part in its spectrum, and what crosstalk
-                // weakens moves as fast as all else: 1.6π with a crosstalk of 0.3 pixels comes to 41.2 dB of Cornell's room
-                // where blended slopes come to 40.5, in 50 steps (of a panel that showed each pixel's middle phase all over it).
-                let light = &light[row * width..][..width];
-                cells.zip(light).enumerate().for_each(|(column, ((((wish, first), second), p), u))| {
-                    let still = incident.map_or(one, |wave| wave[row * width + column]) * self.model.dead;
-                    adam.turn(wish, first, second, slope(p, u - still));
-                });
-                return;
-            }
             if let Some(wave) = incident {
                 cells.zip(&wave[row * width..]).for_each(|((((wish, first), second), p), wave)| {
-                    adam.turn(wish, first, second, slope(p, self.model.show(*wish).1 * wave));
+                    adam.turn(wish, first, second, slope(*p, self.model.show(*wish).1 * wave));
                 });
                 return;
             }
             cells.for_each(|(((wish, first), second), p)| {
                 let light = self.model.show(*wish).1;
-                adam.turn(wish, first, second, slope(p, light));
+                adam.turn(wish, first, second, slope(*p, light));
             });
         };
         self.sight.slopes(pulls, &mut rows, take, self.progress);

@@ -248,7 +248,7 @@ impl ViewEncoding {
         // alike with 0.2, 48.8 with 0.05 (the layers 40.9 and 40.2); after 130 for 10 × 10 mm nine frames of the layers are 25.9
         // with 0.1 and 27.1 with 0.05 (960 × 540). Many steps for a known eye are the better the shorter they are. Planes are
         // further off, and so is what a panel shows whose pixels run into each other.
-        let (rate, most) = if model.blends() { (0.2, 1.0) } else { (0.05, 2.0) };
+        let (rate, most) = if model.blends() { (0.1, 1.0) } else { (0.05, 2.0) };
         let slower = if is_known(target.viewer) { (50.0 / iterations.max(1) as f64).sqrt().min(most) } else { 1.0 };
         let rate = if whole { 0.1 } else { rate * slower };
         let scattered = Spots::are_scattered(target.viewer);

@@ -76,14 +76,7 @@ impl<S: Sight> Slopes<'_, S> {
         let settings = Descent { iterations: 1, rate: 0.1, looks: 3, seed: 1 };
         problem.step(&mut moved, &prepared, &settings, 0).expect("step");
         let slope = |frame: &Frame| frame.moments[0].iter().map(|m| f64::from(*m) * unit).collect();
-        let mut slopes: Vec<Vec<f64>> = moved.iter().map(slope).collect();
-        if self.model.blends() {
-            // The step goes by the slopes of what the panel shows.
-            for slopes in &mut slopes {
-                let shown = slopes.iter().map(|s| *s as f32).collect();
-                *slopes = self.model.pulled_back(shown).into_iter().map(f64::from).collect();
-            }
-        }
+        let slopes: Vec<Vec<f64>> = moved.iter().map(slope).collect();
         let rms = (slopes.iter().flatten().map(|s| s * s).sum::<f64>() / (count * grid.len()) as f64).sqrt();
         // Along the slopes of all pixels, of a side of the panel, of the last frame, and of a checkerboard's fields.
         for part in 0..4 {
