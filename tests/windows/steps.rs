@@ -177,12 +177,12 @@ fn served(wine: &Wine) {
 fn interrupted(wine: &Wine) {
     let root = tempfile::tempdir().expect("folder");
     let [there, _] = folders(root.path());
-    // Long before their ends.
-    for (after, arguments) in [
-        (2500, &["show", "cornell", "-o", "out"][..]),
-        (4000, &["print", "cornell", "--plate", "chrome-0.5um", "--size", "20mm,20mm", "-o", "plate"]),
+    // Long before their ends, and after they have begun even on a busy machine: earlier, wine ends a program with code 0.
+    for arguments in [
+        &["show", "cornell", "--iterations", "5000", "-o", "out"][..],
+        &["print", "cornell", "--plate", "chrome-0.5um", "--size", "20mm,20mm", "-o", "plate"],
     ] {
-        let out = wine.interrupted(&there, after, arguments);
+        let out = wine.interrupted(&there, 8000, arguments);
         let said = String::from_utf8_lossy(&out.stderr);
         assert_eq!(out.status.code(), Some(130), "{arguments:?}: {said}");
     }
