@@ -98,7 +98,18 @@ fn free_in(folder: &Path) -> Option<u64> {
     disk.f_bavail.checked_mul(disk.f_frsize)
 }
 
-#[cfg(not(unix))]
+#[cfg(windows)]
+fn free_in(folder: &Path) -> Option<u64> {
+    use std::os::windows::ffi::OsStrExt;
+    use windows_sys::Win32::Storage::FileSystem::GetDiskFreeSpaceExW;
+    let name: Vec<u16> = folder.as_os_str().encode_wide().chain([0]).collect();
+    let mut free = 0;
+    // SAFETY: the name ends in a zero; the one number asked for is ours.
+    let told = unsafe { GetDiskFreeSpaceExW(name.as_ptr(), &mut free, std::ptr::null_mut(), std::ptr::null_mut()) };
+    (told != 0).then_some(free)
+}
+
+#[cfg(not(any(unix, windows)))]
 fn free_in(_: &Path) -> Option<u64> {
     None
 }
@@ -106,6 +117,13 @@ fn free_in(_: &Path) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[cfg(any(unix, windows))]
+    fn a_disk_tells_how_much_is_free_on_it() {
+        let folder = tempfile::tempdir().expect("folder");
+        assert!(free_space(&folder.path().join("not/there/yet")).is_some_and(|bytes| bytes > 0));
+    }
 
     #[test]
     fn a_failed_write_leaves_the_old_file_and_no_partial() {

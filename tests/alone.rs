@@ -97,6 +97,31 @@ fn built_in_scenes_are_the_files_and_a_file_of_that_name_wins() {
     refused(f, &["points", "cornell"], "not a kind of file");
 }
 
+/// `.github/FIRST_LIGHT.md`, but for what needs a monitor; the letters are where the page says.
+#[test]
+fn the_page_for_first_light_holds() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/.github/FIRST_LIGHT.md");
+    let page = fs::read_to_string(page).expect("page");
+    let blocks = page.split("```sh\n").skip(1).filter_map(|block| block.split_once("```"));
+    let commands: Vec<&str> = blocks.flat_map(|(block, _)| block.lines()).collect();
+    assert_eq!(commands.len(), 3, "{commands:?}");
+    for command in commands {
+        let arguments: Vec<&str> = command.split(' ').skip(1).collect();
+        done(f, &arguments);
+    }
+    let seen = image::open(f.join("expected.png")).expect("picture").into_luma8();
+    assert_eq!(seen.dimensions(), (400, 300));
+    // Light of a quarter: an F is heavier above, an L below.
+    let light = |right: bool, below: bool| -> f64 {
+        let inside = seen.enumerate_pixels().filter(|(x, y, _)| (*x >= 200) == right && (*y >= 150) == below);
+        inside.map(|(_, _, level)| f64::from(level.0[0]).powi(2)).sum()
+    };
+    assert!(light(false, false) > 1.1 * light(false, true), "an F stands on the left");
+    assert!(light(true, true) > 1.1 * light(true, false), "an L stands on the right");
+}
+
 #[test]
 fn man_pages_and_completions_are_written_for_every_command() {
     let folder = tempfile::tempdir().expect("folder");

@@ -1,8 +1,10 @@
 //! What would spoil levels between a frame and the panel: everything that can be found out, with its remedy.
 
 use super::choice::MonitorChoice;
-use super::monitor::{Gamma, Monitor};
+use super::monitor::{Gamma, Monitor, by};
 use super::session::Display;
+#[cfg(windows)]
+use super::win32::night_light;
 use super::x11::{Property, Screen};
 use crate::error::Result;
 use serde::Serialize;
@@ -26,8 +28,8 @@ pub enum Severity {
 pub struct Finding {
     /// The monitor; none for the whole desktop.
     pub monitor: Option<String>,
-    /// What was looked at: `gamma`, `rotation`, `scaling`, `mirroring`, `mode`, `range`, `dithering`, `colour matrix`,
-    /// `depth`, `compositor`, `window system`.
+    /// What was looked at: `gamma`, `hdr`, `rotation`, `scaling`, `mirroring`, `mode`, `range`, `dithering`,
+    /// `colour matrix`, `depth`, `compositor`, `night light`, `window system`.
     pub subject: &'static str,
     /// How it stands.
     pub severity: Severity,
@@ -52,7 +54,10 @@ pub fn examine(display: &mut Display, choice: Option<&MonitorChoice>) -> Result<
     };
     let x11 = display.x11();
     let screen = x11.as_ref().map(|x11| x11.screen()).transpose()?;
-    let mut findings = judge_screen(screen.as_ref());
+    let mut findings = match cfg!(windows) {
+        true => judge_windows(night_light()),
+        false => judge_screen(screen.as_ref()),
+    };
     for monitor in chosen {
         let properties = match &x11 {
             Some(x11) => x11.properties(&monitor.name)?,
@@ -94,6 +99,26 @@ fn judge_screen(screen: Option<&Screen>) -> Vec<Finding> {
     vec![finding("window system", Severity::Good, "X11".into()), depth, compositor]
 }
 
+#[cfg(not(windows))]
+fn night_light() -> Option<bool> {
+    None
+}
+
+/// Windows, and what it does to all monitors at once.
+fn judge_windows(night_light: Option<bool>) -> Vec<Finding> {
+    let finding = |subject, severity, what: &str| Finding { monitor: None, subject, severity, what: what.into() };
+    let night_light = match night_light {
+        Some(false) => finding("night light", Severity::Good, "off"),
+        Some(true) => finding(
+            "night light",
+            Severity::Warning,
+            "on: it changes levels (Settings, System, Display, Night light: off)",
+        ),
+        None => finding("night light", Severity::Unknown, "Windows does not tell; make sure that it is off"),
+    };
+    vec![finding("window system", Severity::Good, "Windows"), night_light]
+}
+
 fn judge_monitor(monitor: &Monitor, properties: &[Property]) -> Vec<Finding> {
     let name = &monitor.name;
     let mut findings = Vec::new();
@@ -116,6 +141,9 @@ fn judge_monitor(monitor: &Monitor, properties: &[Property]) -> Vec<Finding> {
                 Gamma::Identity | Gamma::Altered { .. } => judge("gamma", "the table is the identity"),
             },
         ]);
+        if scan_out.high_dynamic_range.is_some() {
+            findings.push(judge("hdr", "off"));
+        }
     } else if monitor.scale != 1.0 {
         findings.push(judge("scaling", "not scaled"));
     }
@@ -133,8 +161,11 @@ fn judge_mode(monitor: &Monitor) -> Finding {
         Some((columns, rows)) => (
             Severity::Fault,
             format!(
-                "{width}x{height}, but {name} asks for {columns}x{rows}: its own scaler makes up the pixels \
-                 (xrandr --output {name} --mode {columns}x{rows})"
+                "{width}x{height}, but {name} asks for {columns}x{rows}: its own scaler makes up the pixels ({})",
+                by(
+                    &format!("xrandr --output {name} --mode {columns}x{rows}"),
+                    &format!("Display resolution: {columns}x{rows}")
+                )
             ),
         ),
         None => (Severity::Unknown, format!("{width}x{height}; {name} does not say which mode is its own")),
@@ -238,6 +269,7 @@ mod tests {
                 rotated: false,
                 transformed: false,
                 gamma: Gamma::Identity,
+                high_dynamic_range: Some(false),
                 shared_with: Vec::new(),
                 preferred: None,
             }),
@@ -260,18 +292,19 @@ mod tests {
     fn a_clean_monitor_is_good_in_everything_that_can_be_known() {
         let properties = [property("Broadcast RGB", "Full"), property("dither", "off"), property("CTM", IDENTITY_CTM)];
         let findings = judge_monitor(&monitor(), &properties);
-        assert_eq!(findings.len(), 8);
+        assert_eq!(findings.len(), 9);
         assert!(findings.iter().all(|finding| finding.severity == Severity::Good), "{findings:?}");
     }
 
     #[test]
     fn each_fault_is_told_under_its_subject_and_no_other() {
         type Spoil = fn(&mut Monitor);
-        let spoil: [(&str, Spoil); 5] = [
+        let spoil: [(&str, Spoil); 6] = [
             ("rotation", |m| m.scan_out.as_mut().expect("scan-out").rotated = true),
             ("scaling", |m| m.scale = 1.5),
             ("scaling", |m| m.scan_out.as_mut().expect("scan-out").transformed = true),
             ("mirroring", |m| m.scan_out.as_mut().expect("scan-out").shared_with = vec!["DP-1".into()]),
+            ("hdr", |m| m.scan_out.as_mut().expect("scan-out").high_dynamic_range = Some(true)),
             ("gamma", |m| m.scan_out.as_mut().expect("scan-out").gamma = Gamma::Altered { levels: 9 }),
         ];
         for (subject, spoil) in spoil {
@@ -323,5 +356,10 @@ mod tests {
         let bad = judge_screen(Some(&Screen { depth: 30, composited: true }));
         assert_eq!(of(&bad, "depth").severity, Severity::Fault);
         assert_eq!(of(&bad, "compositor").severity, Severity::Warning);
+        for (told, severity) in
+            [(Some(false), Severity::Good), (Some(true), Severity::Warning), (None, Severity::Unknown)]
+        {
+            assert_eq!(of(&judge_windows(told), "night light").severity, severity);
+        }
     }
 }

@@ -15,8 +15,9 @@
 //! behind the frame buffer (limited-range RGB, dithering in the card's output stage, overscan in the monitor) cannot
 //! be seen from here.
 //!
-//! On X11 all of this is checked. On Wayland size, scale and rotation are; gamma tables and what else alters colours cannot
-//! be asked for. On other systems, what winit tells is checked.
+//! On X11 all of this is checked. On Windows it is, too, and that HDR is off; a desktop that is scaled there does no harm, since the
+//! window asks for the monitor's own pixels. On Wayland size, scale and rotation are checked; gamma tables and what else alters
+//! colours cannot be asked for. On other systems, what winit tells is checked.
 //!
 //! ```
 //! use holodrive::display::{DisplayFrame, MonitorChoice};
@@ -55,6 +56,8 @@ mod trigger;
 mod vblank;
 #[cfg(all(unix, not(any(target_vendor = "apple", target_os = "android"))))]
 mod wayland;
+#[cfg(windows)]
+mod win32;
 mod window;
 mod x11;
 

@@ -28,7 +28,7 @@ pub struct Monitor {
     pub primary: bool,
     /// What the monitor says about itself, where it can be had.
     pub edid: Option<Edid>,
-    /// What happens between frame buffer and cable, where the system tells (X11; of rotation, Wayland).
+    /// What happens between frame buffer and cable, where the system tells (X11, Windows; of rotation, Wayland).
     pub scan_out: Option<ScanOut>,
     /// The monitors that show it, where it is a region of the desktop and not one of them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -44,6 +44,8 @@ pub struct ScanOut {
     pub transformed: bool,
     /// The look-up table behind the frame buffer.
     pub gamma: Gamma,
+    /// Whether levels are mapped into an HDR signal, where the system says so (Windows).
+    pub high_dynamic_range: Option<bool>,
     /// Other monitors that show the same part of the desktop, whole or in part.
     pub shared_with: Vec<String>,
     /// The mode that the monitor prefers (columns, rows) [px]: the one with one pixel for one.
@@ -93,7 +95,7 @@ impl Monitor {
         self.faults_by_subject().into_iter().map(|(_, fault)| fault).collect()
     }
 
-    /// The faults, each under its subject: `scaling`, `rotation`, `gamma` or `mirroring`.
+    /// The faults, each under its subject: `scaling`, `rotation`, `gamma`, `hdr` or `mirroring`.
     pub(super) fn faults_by_subject(&self) -> Vec<(&'static str, String)> {
         if !self.parts.is_empty() {
             return self.parts.iter().flat_map(Self::faults_by_subject).collect();
@@ -106,39 +108,35 @@ impl Monitor {
         }
         let Some(scan_out) = &self.scan_out else { return faults };
         if scan_out.rotated {
-            add(
-                "rotation",
-                format!(
-                    "{name} is rotated or mirrored; turn that off in the desktop's settings (on X11: xrandr --output {name} --rotate \
-                 normal --reflect normal)"
-                ),
+            let how = by(
+                &format!("xrandr --output {name} --rotate normal --reflect normal"),
+                "Display orientation: Landscape",
             );
+            add("rotation", format!("{name} is rotated or mirrored; turn that off in the desktop's settings ({how})"));
         }
         if scan_out.transformed {
-            add(
-                "scaling",
-                format!(
-                    "{name} is scaled by the graphics card; turn that off (xrandr --output {name} --scale 1 --transform none)"
-                ),
+            let how = by(
+                &format!("xrandr --output {name} --scale 1 --transform none"),
+                "Display resolution: the recommended one",
             );
+            add("scaling", format!("{name} is scaled by the graphics card; turn that off ({how})"));
         }
         if let Gamma::Altered { levels } = scan_out.gamma {
-            add(
-                "gamma",
-                format!(
-                    "the graphics card's gamma table changes {levels} of 256 levels on {name}; turn night light and colour \
-                 profiles off for it (xrandr --output {name} --gamma 1:1:1 --brightness 1)"
-                ),
+            let how = by(
+                &format!("xrandr --output {name} --gamma 1:1:1 --brightness 1"),
+                "Night light: off; Colour profile: none",
             );
+            let what = format!("the graphics card's gamma table changes {levels} of 256 levels on {name}");
+            add("gamma", format!("{what}; turn night light and colour profiles off for it ({how})"));
+        }
+        if scan_out.high_dynamic_range == Some(true) {
+            let how = by("in the desktop's settings", "Use HDR: off");
+            add("hdr", format!("{name} is sent HDR, into which levels are mapped by a curve; turn that off ({how})"));
         }
         if !scan_out.shared_with.is_empty() {
-            add(
-                "mirroring",
-                format!(
-                    "{name} shows the same part of the desktop as {}; place it beside (xrandr --output {name} --right-of …)",
-                    scan_out.shared_with.join(", ")
-                ),
-            );
+            let others = scan_out.shared_with.join(", ");
+            let how = by(&format!("xrandr --output {name} --right-of …"), "Multiple displays: Extend these displays");
+            add("mirroring", format!("{name} shows the same part of the desktop as {others}; place it beside ({how})"));
         }
         faults
     }
@@ -164,6 +162,11 @@ impl fmt::Display for Monitor {
     }
 }
 
+/// How something is set: by X's own program, or where Windows has it.
+pub(super) fn by(x11: &str, windows: &str) -> String {
+    if cfg!(windows) { format!("Settings, System, Display, {windows}") } else { x11.to_owned() }
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
@@ -185,6 +188,7 @@ pub(super) mod tests {
             rotated: false,
             transformed: false,
             gamma: Gamma::Identity,
+            high_dynamic_range: None,
             shared_with: Vec::new(),
             preferred: None,
         });
@@ -223,11 +227,12 @@ pub(super) mod tests {
             rotated: true,
             transformed: true,
             gamma: Gamma::Altered { levels: 7 },
+            high_dynamic_range: Some(true),
             shared_with: vec!["DP-1".into()],
             preferred: None,
         });
         let faults = spoilt.faults();
-        assert_eq!(faults.len(), 5);
+        assert_eq!(faults.len(), 6);
         assert!(faults.iter().all(|fault| fault.contains("HDMI-1")));
     }
 

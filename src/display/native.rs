@@ -3,7 +3,7 @@
 use super::keys::KeyPress;
 use super::monitor::Monitor;
 use super::rectangle::Rectangle;
-use super::session::{Display, Inbox, WindowEvents};
+use super::session::{Display, Inbox, WindowEvents, name_of};
 use super::x11::X11;
 use crate::error::{Error, Result};
 use std::cell::RefCell;
@@ -89,12 +89,13 @@ impl NativeWindow {
                 monitor.width, monitor.height, size.width, size.height
             )));
         }
-        if window.scale_factor() != 1.0 {
+        // On Windows a window has the monitor's own pixels, which its size has just shown.
+        if !cfg!(windows) && window.scale_factor() != 1.0 {
             let scale = window.scale_factor();
             return Ok(Some(format!("the window system scales {name} by {scale}; set its scale to 1")));
         }
         // Wayland tells the monitor only once something has been drawn.
-        let elsewhere = window.current_monitor().and_then(|handle| handle.name()).filter(|on| on != name);
+        let elsewhere = window.current_monitor().and_then(|handle| name_of(&handle)).filter(|on| on != name);
         Ok(elsewhere.map(|on| format!("the window should be on {name} but the window system put it on {on}")))
     }
 

@@ -2,7 +2,9 @@
 
 use super::kernel;
 use super::keys::{KeyPress, ends};
-use super::monitor::{Gamma, Monitor, ScanOut};
+use super::monitor::Monitor;
+#[cfg(all(unix, not(any(target_vendor = "apple", target_os = "android"))))]
+use super::monitor::{Gamma, ScanOut};
 use super::x11::X11;
 use crate::error::{Error, Result};
 use std::cell::RefCell;
@@ -134,6 +136,7 @@ impl Display {
                 rotated,
                 transformed: false,
                 gamma: Gamma::Unknown,
+                high_dynamic_range: None,
                 // A fullscreen window is on one monitor, wherever the others lie.
                 shared_with: Vec::new(),
                 preferred,
@@ -145,7 +148,14 @@ impl Display {
         Ok(())
     }
 
-    #[cfg(not(all(unix, not(any(target_vendor = "apple", target_os = "android")))))]
+    /// Adds what Windows tells of its monitors: EDID and scan-out.
+    #[cfg(windows)]
+    fn add_scan_out(&mut self, monitors: &mut [Monitor]) -> Result<()> {
+        super::win32::complete(monitors);
+        Ok(())
+    }
+
+    #[cfg(not(any(windows, all(unix, not(any(target_vendor = "apple", target_os = "android"))))))]
     fn add_scan_out(&mut self, _: &mut [Monitor]) -> Result<()> {
         Ok(())
     }
@@ -215,7 +225,7 @@ impl Display {
 /// A monitor as winit describes it, with its EDID from the kernel; neither knows its scan-out.
 fn monitor_of(index: usize, handle: &MonitorHandle, primary: bool) -> Monitor {
     let (size, position) = (handle.size(), handle.position());
-    let name = handle.name().unwrap_or_else(|| format!("monitor-{index}"));
+    let name = name_of(handle).unwrap_or_else(|| format!("monitor-{index}"));
     Monitor {
         index,
         edid: kernel::edid(&name, (size.width, size.height)),
@@ -225,11 +235,18 @@ fn monitor_of(index: usize, handle: &MonitorHandle, primary: bool) -> Monitor {
         x: position.x,
         y: position.y,
         refresh: handle.refresh_rate_millihertz().map(|rate| f64::from(rate) / 1e3),
-        scale: handle.scale_factor(),
+        // A window on Windows has the monitor's own pixels, whatever the desktop's scale.
+        scale: if cfg!(windows) { 1.0 } else { handle.scale_factor() },
         primary,
         scan_out: None,
         parts: Vec::new(),
     }
+}
+
+/// What a monitor is called: `DISPLAY1` where Windows says `\\.\DISPLAY1`.
+pub(super) fn name_of(handle: &MonitorHandle) -> Option<String> {
+    let name = handle.name()?;
+    Some(name.strip_prefix(r"\\.\").map(str::to_owned).unwrap_or(name))
 }
 
 struct Handler<'a, F> {

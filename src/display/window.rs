@@ -6,7 +6,7 @@ use super::keys::KeyPress;
 use super::monitor::Monitor;
 use super::native::NativeWindow;
 use super::presenter::{Presenter, Surface};
-use super::session::Display;
+use super::session::{Display, name_of};
 use super::trigger::TriggerPatch;
 use super::vblank::VerticalBlank;
 use crate::error::{Error, Result};
@@ -309,6 +309,8 @@ impl Open {
             _ => None,
         };
         let open = Self { surface, native, background, blank };
+        #[cfg(windows)]
+        super::win32::keep_awake(true);
         if let Some((x11, id)) = &open.native.x11 {
             x11.keep_awake(true)?;
             x11.keep_above(*id)?;
@@ -332,6 +334,8 @@ impl Open {
 
 impl Drop for Open {
     fn drop(&mut self) {
+        #[cfg(windows)]
+        super::win32::keep_awake(false);
         if let Some((x11, _)) = &self.native.x11 {
             // A connection that is lost has taken the request with it.
             let _ = x11.keep_awake(false);
@@ -348,7 +352,7 @@ fn attributes(event_loop: &ActiveEventLoop, monitor: &Monitor, on_x11: bool) -> 
     if on_x11 {
         return Ok(unmanaged(attributes));
     }
-    let handle = event_loop.available_monitors().find(|handle| handle.name().as_ref() == Some(&monitor.name));
+    let handle = event_loop.available_monitors().find(|handle| name_of(handle).as_ref() == Some(&monitor.name));
     let Some(handle) = handle else {
         return Err(Error::Display { what: format!("monitor {} is gone", monitor.name) });
     };

@@ -130,6 +130,7 @@ impl X11 {
                     rotated: one.crtc.rotation != randr::Rotation::ROTATE0,
                     transformed: self.transformed(one.info.crtc)?,
                     gamma: self.gamma(one.info.crtc)?,
+                    high_dynamic_range: None,
                     shared_with: active.iter().filter(shares).map(|other| other.name.clone()).collect(),
                     preferred: preferred
                         .and_then(|id| mode(*id))

@@ -3,6 +3,7 @@
 use bytemuck::Zeroable;
 
 /// Bytes from which large pages are asked for: some of the system's 2 MiB pages.
+#[cfg(any(target_os = "linux", test))]
 const LARGE: usize = 8 << 20;
 
 /// `count` zeros; a large block is taken page by page when it is first *written*.

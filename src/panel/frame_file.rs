@@ -221,7 +221,7 @@ fn decode(path: &Path, bytes: &[u8], profile: Option<&PanelProfile>) -> Result<(
             let (width, height) = (info.width as usize, info.height as usize);
             let values = match info.bit_depth {
                 png::BitDepth::Sixteen => data.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect(),
-                png::BitDepth::Eight => data[..width * height].iter().map(|&b| b.into()).collect(),
+                png::BitDepth::Eight => data[..width * height].iter().map(|&b| u16::from(b)).collect(),
                 depth => unpacked_rows(&data, width, height, depth as usize),
             };
             let white = ((1u32 << info.bit_depth as u32) - 1) as u16;
@@ -297,7 +297,7 @@ impl Picture {
         match self {
             Self::Gray { width, height, white, values } if (width, height) == panel => Ok(white_is_one(values, white)),
             Self::Rgb { width, height, rgb } if (width, height) == panel && packing.is_none() && is_gray(&rgb) => {
-                Ok(white_is_one(rgb.iter().step_by(3).map(|&v| v.into()).collect(), 255))
+                Ok(white_is_one(rgb.iter().step_by(3).map(|&v| u16::from(v)).collect(), 255))
             }
             Self::Rgb { width, height, rgb } if (width, height) == (layout.width, layout.height) => {
                 unpack(path, profile, layout, rgb)

@@ -101,7 +101,10 @@ pub fn usual_socket(name: &str) -> Option<PathBuf> {
     #[cfg(unix)]
     return Some(local::runtime_folder().join(format!("{name}.sock")));
     #[cfg(not(unix))]
-    return None;
+    {
+        let _ = name;
+        None
+    }
 }
 
 /// A frame as a client sent it: of the panel's size, row-major, row 0 on top.
