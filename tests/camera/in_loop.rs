@@ -71,7 +71,8 @@ pub(crate) fn corrected(
     let mut photograph = |frame: &Frame| {
         first.get_or_insert_with(|| judged(bench, &frame.levels, room, tilt));
         count += 1;
-        view.registered(&bench.photo(&frame.levels, 100 + count), &places)
+        // Exposed for the picture: the zero order is full.
+        view.registered(&bench.exposed(&frame.levels, 100 + count, 970), &places)
     };
     let photograph: &mut Photograph<'_> = &mut photograph;
     let settings = FarSettings { photos, photo_step: 0.02, ..FarSettings::default() };
