@@ -470,7 +470,7 @@ mod local {
         assert!(bad.ask(LEVELS).contains("shared file"));
         still(&mut good);
         // A line without end.
-        writeln!(bad.stream.get_mut(), "{}", "x".repeat(100_000)).ok();
+        writeln!(bad.stream.get_mut(), "{}", "x".repeat(600_000)).ok();
         assert!(bad.line().contains("longer"));
         still(&mut good);
         // One that goes in the middle of a line, and one that goes before it has read anything.

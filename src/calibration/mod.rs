@@ -22,8 +22,8 @@ mod sweep;
 pub mod zernike;
 
 pub use camera::{
-    CameraBench, CameraFit, CameraPhoto, CameraReport, MAPPING, Mapping, RANDOM, calibrate_camera, camera_frames,
-    camera_photo_file, photo_name,
+    CameraBench, CameraFit, CameraPhoto, CameraReport, CameraView, MAPPING, Mapping, PHOTO_ENDINGS, RANDOM,
+    calibrate_camera, camera_frames, camera_photo_file, photo_file, photo_name,
 };
 pub use cards::{Card, card_frames, cards};
 pub use curve::{CurveFit, CurveReport, MeasuredCurve, fit, fit_curve, measure_curve};

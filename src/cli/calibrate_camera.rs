@@ -2,6 +2,7 @@
 
 use super::args::CameraArgs;
 use super::bar::Bar;
+use super::camera_command::CameraCommand;
 use super::given_out::{give_out, phase_panel};
 use super::report::{Report, seconds};
 use crate::calibration::{
@@ -12,8 +13,7 @@ use crate::panel::Setup;
 use crate::progress::Progress;
 use crate::{Error, Result};
 use std::f64::consts::PI;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 use std::time::Instant;
 
 pub(super) fn camera(args: &CameraArgs) -> Result<Report> {
@@ -70,38 +70,15 @@ pub(super) fn camera(args: &CameraArgs) -> Result<Report> {
 
 /// Runs the command for each frame.
 fn take(command: &str, folder: &Path, frames: &Path, progress: &Progress) -> Result<()> {
-    if !command.contains("{photo}") {
-        let what = "name {photo}, the path that the photo is to have without its ending, and {frame} where the frame is needed";
-        return Err(Error::parameter("camera-command", what));
-    }
+    let camera = CameraCommand::new(command)?;
     progress.start("photos", RANDOM as u64 + 1);
     for k in 0..=RANDOM {
         progress.check()?;
         let name = photo_name(k);
-        for old in ["npy", "png", "tif", "tiff", "bmp"] {
-            // A photo of an earlier run must not pass for this one's.
-            let _ = std::fs::remove_file(folder.join(format!("{name}.{old}")));
-        }
-        let line = command
-            .replace("{frame}", &quoted(&frames.join(format!("{name}.png"))))
-            .replace("{photo}", &quoted(&folder.join(&name)));
-        let mut shell = if cfg!(windows) { Command::new("cmd") } else { Command::new("sh") };
-        let status =
-            shell.arg(if cfg!(windows) { "/C" } else { "-c" }).arg(&line).stdout(std::process::Stdio::null()).status();
-        let status = status.map_err(Error::io("camera-command"))?;
-        if !status.success() {
-            return Err(Error::parameter("camera-command", format!("`{line}` ended with {status}")));
-        }
+        camera.take(&frames.join(format!("{name}.png")), &folder.join(&name))?;
         progress.advance(1);
     }
     Ok(())
-}
-
-/// A path as one word of a shell's line.
-fn quoted(path: &Path) -> String {
-    let path: PathBuf = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-    let text = path.display().to_string();
-    if cfg!(windows) { format!("\"{text}\"") } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }
 
 fn tell(found: &CameraReport, time: f64, report: &mut Report) {

@@ -5,6 +5,7 @@ use super::bar::Bar;
 use super::eye;
 use super::field::{self, For, Held};
 use super::holograms::{Maker, named, report_encoding};
+use super::in_the_loop;
 use super::light::report_map;
 use super::load::{Input, input};
 use super::output;
@@ -33,6 +34,10 @@ pub(super) fn encode(args: &EncodeArgs) -> Result<Report> {
     let bar = Bar::new();
     let source = input(&args.input)?;
     output::check(&args.output, &output::FRAMES)?;
+    if let Some(camera) = &args.camera.in_the_loop {
+        in_the_loop::encode(args, camera, &setup, &mut report)?;
+        return Ok(report);
+    }
     if let Input::Views(path) = &source {
         encode_views(args, path, &setup, &bar.progress, &mut report)?;
         return Ok(report);

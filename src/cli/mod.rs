@@ -7,6 +7,7 @@ mod bench;
 mod calibrate;
 mod calibrate_camera;
 mod calibrate_plate;
+mod camera_command;
 #[cfg(feature = "display")]
 mod controls;
 mod encode;
@@ -14,6 +15,7 @@ mod eye;
 mod field;
 mod given_out;
 mod holograms;
+mod in_the_loop;
 mod layers;
 mod light;
 #[cfg(feature = "display")]

@@ -102,6 +102,8 @@ struct Service {
     settings: ServeSettings,
     idle: Frame,
     on_client_gone: OnClientGone,
+    /// Memory for preloaded frames [bytes].
+    preload: u64,
     /// Whether clients are told where they come in as JSON.
     json: bool,
 }
@@ -116,7 +118,15 @@ impl Service {
         let idle = idle_frame(&args.idle, &panel, &driver, report)?;
         let served = driver.served(args.name.as_deref().unwrap_or(&panel.profile.name))?;
         let settings = settings(args, &served, report)?;
-        Ok(Self { driver, panel: served, settings, idle, on_client_gone: args.on_client_gone, json })
+        Ok(Self {
+            driver,
+            panel: served,
+            settings,
+            idle,
+            on_client_gone: args.on_client_gone,
+            preload: args.preload,
+            json,
+        })
     }
 
     fn start(&self) -> Result<Server> {
@@ -138,7 +148,7 @@ impl Service {
             Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => {}
             other => other.map_err(|source| Error::Io { path: "standard output".into(), source })?,
         }
-        let settings = KeepSettings { idle: &self.idle, on_client_gone: self.on_client_gone };
+        let settings = KeepSettings { idle: &self.idle, on_client_gone: self.on_client_gone, memory: self.preload };
         serve::keep(server, output, &self.driver, settings, progress)
     }
 }
@@ -155,6 +165,9 @@ fn announced(announcement: &Announcement, place: &str) -> String {
     }
     if let Some(at) = &announcement.local {
         text += &format!("\n  local     {}  holodrive.SLM(\"{name}\")", at.display());
+    }
+    if let Some(at) = announcement.trigger {
+        text += &format!("\n  trigger   {at}  a line of text for each frame");
     }
     text
 }
@@ -203,6 +216,7 @@ fn settings(args: &ServeArgs, served: &ServedPanel, report: &mut Report) -> Resu
         slmsuite: args.slmsuite.or(none.then_some(USUAL.0)).map(at),
         slmpy,
         local,
+        trigger: args.trigger.map(at),
         calibrated,
         log: args.log.clone(),
         settle: Duration::from_secs_f64(if args.settle { served.settle_time.max(0.0) } else { 0.0 }),

@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::names::{Name, Named};
 use crate::progress::Progress;
 use serde::Serialize;
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -134,6 +135,8 @@ pub struct PanelLoop<'a> {
     presenter: Presenter,
     adapter: Option<String>,
     first_presented: f64,
+    /// Frames that are kept packed, by number.
+    pub(super) ready: HashMap<u64, Arc<DisplayFrame>>,
 }
 
 impl<'a> PanelLoop<'a> {
@@ -161,6 +164,7 @@ impl<'a> PanelLoop<'a> {
             presenter: panel.presenter().unwrap_or_default(),
             adapter: panel.adapter(),
             first_presented: begin.elapsed().as_secs_f64(),
+            ready: HashMap::new(),
             panel,
         })
     }

@@ -4,7 +4,7 @@ use super::frame::DisplayFrame;
 use super::panel_loop::{PanelLoop, ShowEnd, Turn};
 use crate::error::{Error, Result};
 use crate::panel::Frame;
-use crate::serve::{Output, Readiness, ShownAt};
+use crate::serve::{Output, Readiness, ShownAt, not_ready};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -22,8 +22,33 @@ impl Output for PanelLoop<'_> {
 
     fn show(&mut self, frame: &Frame) -> Result<ShownAt> {
         let frame = Arc::new(DisplayFrame::packed(&[frame])?);
+        self.present(&frame)
+    }
+
+    fn preload(&mut self, number: u64, frame: &Frame) -> Result<()> {
+        self.ready.insert(number, Arc::new(DisplayFrame::packed(&[frame])?));
+        Ok(())
+    }
+
+    fn recall(&mut self, number: u64) -> Result<ShownAt> {
+        let frame = self.ready.get(&number).cloned().ok_or_else(|| not_ready(number))?;
+        self.present(&frame)
+    }
+
+    fn forget(&mut self, number: u64) {
+        self.ready.remove(&number);
+    }
+
+    fn refresh(&self) -> Option<f64> {
+        Some(self.panel.refresh_time())
+    }
+}
+
+impl PanelLoop<'_> {
+    /// Puts a frame into the window for the next refresh.
+    fn present(&mut self, frame: &Arc<DisplayFrame>) -> Result<ShownAt> {
         self.panel.wait_for_vertical_blank(Duration::from_secs_f64(2.0 * self.panel.refresh_time()))?;
-        let presented = self.panel.present(&frame)?;
+        let presented = self.panel.present(frame)?;
         if self.display.x11().is_none() {
             // Elsewhere requests leave for the window system only in a turn of its events.
             self.display.turn(Duration::ZERO)?;
@@ -32,9 +57,5 @@ impl Output for PanelLoop<'_> {
             return Err(Error::Display { what: "the window system does not take frames now".into() });
         }
         Ok(ShownAt { at: presented.at, number: presented.number })
-    }
-
-    fn refresh(&self) -> Option<f64> {
-        Some(self.panel.refresh_time())
     }
 }

@@ -33,7 +33,8 @@
 //! # Ok::<(), holodrive::Error>(())
 //! ```
 //!
-//! The iterative ones also take pictures at depths for targets: [`pictures`], [`iterative`].
+//! The iterative ones also take pictures at depths for targets: [`pictures`], [`iterative`]; a picture in the focal plane of a lens is
+//! found with a camera in the loop: [`far`].
 //!
 //! *Placement.* A phase pattern may be made for light that falls on the panel obliquely or from a point
 //! ([`EncodeSettings::illumination`]): at normal incidence it then carries a blaze or a lens of its own, and what dead space
@@ -46,6 +47,7 @@ pub mod cells;
 pub mod double_phase;
 mod encoding;
 pub mod error_diffusion;
+pub mod far;
 pub mod fringe;
 mod iterated;
 pub mod iterative;

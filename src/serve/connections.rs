@@ -24,12 +24,14 @@ pub struct Server {
     listeners: Vec<(Address, JoinHandle<()>)>,
     slmsuite: Option<SocketAddr>,
     slmpy: Option<SocketAddr>,
+    trigger: Option<SocketAddr>,
 }
 
 #[derive(Clone, Copy)]
 enum Protocol {
     Slmsuite,
     Slmpy,
+    Trigger,
     #[cfg(unix)]
     Local,
 }
@@ -83,9 +85,10 @@ impl Server {
             clients: Mutex::new(Vec::new()),
             counts: Default::default(),
         });
-        let mut server = Self { shared, frames, listeners: Vec::new(), slmsuite: None, slmpy: None };
+        let mut server = Self { shared, frames, listeners: Vec::new(), slmsuite: None, slmpy: None, trigger: None };
         server.slmsuite = settings.slmsuite.map(|address| server.listen(address, Protocol::Slmsuite)).transpose()?;
         server.slmpy = settings.slmpy.map(|address| server.listen(address, Protocol::Slmpy)).transpose()?;
+        server.trigger = settings.trigger.map(|address| server.listen(address, Protocol::Trigger)).transpose()?;
         #[cfg(unix)]
         if let (Some(listener), Some(path)) = (listener, server.local().map(Path::to_path_buf)) {
             let accept = move || listener.accept().map(|(stream, _)| Stream::Local(stream));
@@ -139,6 +142,11 @@ impl Server {
         self.slmpy
     }
 
+    /// Where triggers are heard.
+    pub fn trigger(&self) -> Option<SocketAddr> {
+        self.trigger
+    }
+
     /// The socket of the local protocol.
     #[cfg(unix)]
     pub fn local(&self) -> Option<&Path> {
@@ -172,8 +180,9 @@ impl Server {
     /// What clients have to know to find it.
     pub fn announcement(&self) -> Announcement {
         let ServedPanel { name, width, height, bits, wavelength, .. } = self.shared.panel.clone();
-        let (slmsuite, slmpy, local) = (self.slmsuite, self.slmpy, self.local().map(Path::to_path_buf));
-        Announcement { name, width, height, bits, wavelength, slmsuite, slmpy, local }
+        let (slmsuite, slmpy, trigger) = (self.slmsuite, self.slmpy, self.trigger);
+        let local = self.local().map(Path::to_path_buf);
+        Announcement { name, width, height, bits, wavelength, slmsuite, slmpy, local, trigger }
     }
 
     /// What has come in so far.
@@ -258,6 +267,7 @@ fn start_client(shared: &Arc<Shared>, stream: Stream, protocol: Protocol) {
         let ended = match protocol {
             Protocol::Slmsuite => conversation.slmsuite(),
             Protocol::Slmpy => conversation.slmpy(),
+            Protocol::Trigger => conversation.trigger(),
             #[cfg(unix)]
             Protocol::Local => conversation.local(),
         };

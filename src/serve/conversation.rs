@@ -3,12 +3,15 @@
 use super::clients::{Client, FRAMES, REFUSED, Request, Shared};
 #[cfg(unix)]
 use super::local::{self, Buffer};
+#[cfg(unix)]
+use super::local_request;
 use super::slmsuite::{Command, answer, description, hardware};
 use super::stream::Stream;
-use super::{Flip, FrameRequest, SentFrame, slmpy, slmsuite};
+use super::task::{Done, Task};
+use super::{FrameRequest, SentFrame, slmpy, slmsuite, trigger};
 use std::io::{self, ErrorKind, Read, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::sync_channel;
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -18,6 +21,8 @@ const CHUNK: usize = 64 * 1024;
 const HELD_REQUESTS: usize = 4;
 /// What a client is told when too many frames are being read at once.
 const BUSY: &str = "The server is busy with other frames.";
+/// How often it is looked whether the client of a long task is still there.
+const LOOK: Duration = Duration::from_millis(20);
 /// A request may take this many times the patience in all, however steadily it drips.
 const WHOLE_REQUEST: u32 = 6;
 
@@ -46,10 +51,14 @@ impl<'a> Conversation<'a> {
     }
 
     /// The same, of a frame or another request.
-    fn told_outcome(&self, what: &str, outcome: &Result<Option<Flip>, String>) {
+    fn told_outcome(&self, what: &str, outcome: &Result<Option<Done>, String>) {
         match outcome {
-            Ok(Some(flip)) => self.told(what, &format!("shown as frame {}", flip.number)),
-            Ok(None) => self.told(what, "answered"),
+            Ok(Some(Done::Played(flips))) => {
+                let last = flips.last().map_or(0, |flip| flip.number);
+                self.told(what, &format!("played {} frames to frame {last}", flips.len()));
+            }
+            Ok(Some(Done::Shown(flip))) => self.told(what, &format!("shown as frame {}", flip.number)),
+            Ok(Some(Done::Kept(_)) | None) => self.told(what, "answered"),
             Err(why) => self.told(what, &format!("refused: {why}")),
         }
     }
@@ -144,7 +153,7 @@ impl<'a> Conversation<'a> {
             self.stream.set_read_timeout(None)?;
             self.stream.read_exact(&mut first)?;
             let arrived = Instant::now();
-            let line = match self.line(local::LINE_LIMIT, Some(first[0])) {
+            let line = match self.line(local_request::LINE_LIMIT, Some(first[0])) {
                 Ok(line) => line,
                 Err(error) => {
                     self.refuse("local", &error.to_string());
@@ -153,40 +162,80 @@ impl<'a> Conversation<'a> {
                 }
             };
             self.release();
-            let frame = local::read(&line).and_then(|command| match command {
-                local::Command::Mapped => {
+            let asked = local_request::read(&line).and_then(|command| match command {
+                local_request::Command::Mapped => {
                     buffer.unlink();
                     Ok(None)
                 }
-                local::Command::Show(array) => {
+                local_request::Command::Array(task, array) => {
                     let frame = self
                         .wait_for_room(buffer.bytes(), buffer.bytes())
                         .and_then(|()| buffer.take(array, &shared.panel));
                     self.release();
-                    frame.map(Some)
+                    frame.map(|frame| Some((task, frame)))
                 }
+                local_request::Command::Other(task) => Ok(Some((task, SentFrame::default()))),
             });
-            let outcome = frame.inspect_err(|_| _ = self.shared.count(REFUSED)).and_then(|frame| match frame {
+            let outcome = asked.inspect_err(|_| _ = self.shared.count(REFUSED)).and_then(|asked| match asked {
                 None => Ok(None),
-                Some(frame) => self.show(frame).map(Some),
+                Some((task, frame)) => self.ask(task, frame).map(Some),
             });
             self.told_outcome("local", &outcome);
             let answer = match outcome {
                 Ok(None) => local::done(),
-                Ok(Some(flip)) => local::answer(&flip, arrived),
+                Ok(Some(done)) => local::answer(&done, arrived),
                 Err(why) => local::refusal(&why),
             };
             self.reply(answer.as_bytes())?;
         }
     }
 
-    /// Hands a frame on and waits until it is on the panel, and has settled where that was asked for.
-    fn show(&self, frame: SentFrame) -> Result<Flip, String> {
+    /// Lines of text, each of which shows a frame that is kept ready.
+    pub(super) fn trigger(&mut self) -> io::Result<()> {
+        // Whose the frame is that a trigger shows, it does not say.
+        self.lasting = false;
+        let (mut came, mut chunk) = (Vec::new(), [0; trigger::LINE_LIMIT]);
+        loop {
+            while let Some(end) = came.iter().position(|&byte| byte == b'\n') {
+                let line: Vec<u8> = came.drain(..=end).collect();
+                let asked = trigger::read(&line[..end]).inspect_err(|_| _ = self.shared.count(REFUSED));
+                let outcome = asked.and_then(|task| self.ask(task, SentFrame::default())).map(Some);
+                self.told_outcome("trigger", &outcome);
+                let said = match &outcome {
+                    Ok(done) => done.as_ref().and_then(Done::last).ok_or("nothing was shown"),
+                    Err(why) => Err(why.as_str()),
+                };
+                self.reply(trigger::answer(said).as_bytes())?;
+            }
+            if came.len() > trigger::LINE_LIMIT {
+                self.refuse("trigger", "the line is longer than a name");
+                return self.reply(trigger::answer(Err("the line is longer than a name")).as_bytes());
+            }
+            // Between lines a client may be silent for as long as it likes.
+            self.stream.set_read_timeout(None)?;
+            match self.stream.read(&mut chunk)? {
+                0 => return Err(io::Error::new(ErrorKind::UnexpectedEof, "The client has gone.")),
+                read => came.extend_from_slice(&chunk[..read]),
+            }
+        }
+    }
+
+    /// Hands a frame on and waits until it is on the panel.
+    fn show(&mut self, frame: SentFrame) -> Result<Done, String> {
+        self.ask(Task::Show, frame)
+    }
+
+    /// Hands a task on and waits until it is done, and the panel has settled where that was asked for.
+    fn ask(&mut self, task: Task, frame: SentFrame) -> Result<Done, String> {
         self.client.answering.store(true, Ordering::SeqCst);
         let (answer, shown) = sync_channel(1);
-        self.shared.count(FRAMES);
+        if matches!(task, Task::Show | Task::Recall(_) | Task::Next | Task::Play { .. }) {
+            self.shared.count(FRAMES);
+        }
         let abandoned = Arc::new(AtomicBool::new(false));
+        let (limit, is_long) = (self.shared.patience + task.lasts(), !task.lasts().is_zero());
         let request = FrameRequest {
+            task,
             frame,
             arrived: Instant::now(),
             client: self.lasting.then_some(self.client.number),
@@ -195,19 +244,40 @@ impl<'a> Conversation<'a> {
         };
         let sent = self.shared.frames.send(request).map_err(|_| "The panel is no longer served.".to_owned());
         let outcome = sent.and_then(|()| {
-            let answer = shown.recv_timeout(self.shared.patience);
+            let begin = Instant::now();
+            let answer = loop {
+                let left = limit.saturating_sub(begin.elapsed());
+                match shown.recv_timeout(if is_long { LOOK.min(left) } else { left }) {
+                    Err(RecvTimeoutError::Timeout) if !left.is_zero() && is_long => {
+                        if self.has_gone() {
+                            abandoned.store(true, Ordering::SeqCst);
+                        }
+                    }
+                    answer => break answer,
+                }
+            };
             answer.unwrap_or_else(|_| {
                 abandoned.store(true, Ordering::SeqCst);
                 Err("The panel did not show the frame in time.".into())
             })
         });
-        if let Ok(flip) = &outcome {
+        if let Some(flip) = outcome.as_ref().ok().and_then(Done::last) {
             self.client.proven.store(true, Ordering::SeqCst);
             // Here and not at the panel: others may have theirs shown meanwhile.
             std::thread::sleep(self.shared.settle.saturating_sub(flip.at.elapsed()));
         }
         self.client.answering.store(false, Ordering::SeqCst);
         outcome
+    }
+
+    /// Whether the client went while it was waiting for an answer. One that sends something meanwhile has no use for the answer, either.
+    fn has_gone(&mut self) -> bool {
+        // A timeout of zero would be none.
+        let looked = self.stream.set_read_timeout(Some(Duration::from_millis(1)));
+        match looked.and_then(|()| self.stream.read(&mut [0])) {
+            Ok(_) => true,
+            Err(error) => !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted),
+        }
     }
 
     fn reply(&mut self, bytes: &[u8]) -> io::Result<()> {

@@ -14,6 +14,12 @@ then, with this file beside your script or on ``PYTHONPATH`` (``holodrive serve 
         shown = slm.show(2 * np.pi * x / 16)       # a blazed grating, in radians
         print(shown.time, shown.number, shown.missed)
 
+        for k in range(16):                         # in step with an experiment: frames that are ready
+            slm.preload(k, 2 * np.pi * x * k / 64)
+        slm.show(3)                                 # by name, within a refresh
+        slm.play(range(16), rate=30)                # one after another, with the time of each
+        slm.arm(range(16))                          # one at each line of text that comes on serve's --trigger port
+
 Only Python's standard library and NumPy are used. MIT OR Apache-2.0.
 """
 
@@ -27,7 +33,7 @@ import os
 import socket
 import threading
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, Optional, Tuple, Type, Union
+from typing import TYPE_CHECKING, Any, BinaryIO, Iterable, List, NamedTuple, Optional, Tuple, Type, Union
 
 import numpy as np
 
@@ -54,8 +60,12 @@ class Shown(NamedTuple):
     number: int
     #: Refreshes beside the one that every frame waits for.
     missed: int
-    #: From the request's arrival to the flip [s].
+    #: From the request's arrival to the flip [s]; in a play from the flip that was due.
     latency: float
+
+
+#: Most frames that one request of a play holds.
+_MOST_PLAYED = 32768
 
 
 def _folder() -> str:
@@ -102,6 +112,7 @@ class SLM:
         path: Optional[Union[str, os.PathLike[str]]] = None,
         timeout: float = 10.0,
     ) -> None:
+        self._timeout = timeout
         self._map: Optional[mmap.mmap] = None
         self._lines: Optional[BinaryIO] = None
         # The array lies in memory that is shared with the program, and an answer is that of the request before it: one at a time.
@@ -133,15 +144,74 @@ class SLM:
             self.close()
             raise
 
-    def show(self, array: ArrayLike) -> Shown:
-        """Shows an array of the panel's shape and returns when it is on the panel, as :class:`Shown`.
+    def show(self, array: Union[ArrayLike, str, int]) -> Shown:
+        """Shows an array of the panel's shape, or a frame that :meth:`preload` has made ready, and returns when it is on the panel, as
+        :class:`Shown`.
 
         Floating-point numbers are phases in radians, of any turn (on an amplitude panel: transmittances 0 … 1); they go
-        through the panel's wavefront correction and level curve. Integers are final drive levels.
+        through the panel's wavefront correction and level curve. Integers are final drive levels. Text or a number by itself is the
+        name of a preloaded frame.
 
         :raises ValueError: the array has another shape, or its levels lie outside the panel's.
         :raises Error: the program refused it, or has ended.
         """
+        if isinstance(array, (str, int, np.integer)):
+            return self._shown(self._ask({"recall": str(array)}))
+        return self._shown(self._send(array, {}))
+
+    def preload(self, name: Union[str, int], array: ArrayLike) -> int:
+        """Makes a frame ready under a name (a number counts as its text), in place of one of that name: :meth:`show`, :meth:`play` and
+        triggers then show it without delay. Frames are kept until they are forgotten or the program ends, for all clients.
+
+        :param name: its name, up to 64 bytes.
+        :param array: as for :meth:`show`.
+        :return: how many frames are kept.
+        :raises Error: there is no more memory for them (``serve --preload``), or the program refused it.
+        """
+        return int(self._send(array, {"preload": str(name)})["kept"])
+
+    def play(self, names: Iterable[Union[str, int]], rate: Optional[float] = None) -> List[Shown]:
+        """Shows preloaded frames one after another, each once, none left out, and returns when the last is on the panel.
+
+        Other clients wait meanwhile. Ctrl-C ends the play, and this connection.
+
+        :param names: names of the frames, in their order, each as often as it is to be shown: up to 32768.
+        :param rate: frames a second; by default one at each refresh of the monitor.
+        """
+        asked = [str(name) for name in names]
+        if not 0 < len(asked) <= _MOST_PLAYED:
+            raise ValueError("%d frames to play; 1 to %d are taken" % (len(asked), _MOST_PLAYED))
+        request = {"play": asked} if rate is None else {"play": asked, "rate": float(rate)}
+        lasts = len(asked) * (0.1 if rate is None else 1 / max(float(rate), 1e-3))
+        answer = self._ask(request, lasts)
+        times, first = answer["times"], answer["first"]
+        due = times[0]
+        shown = []
+        for k, (time, missed) in enumerate(zip(times, answer["missed"])):
+            shown.append(Shown(time, first + k, missed, time - due))
+            due = (time if missed or rate is None else due) + (0.0 if rate is None else 1 / rate)
+        return shown
+
+    def arm(self, names: Iterable[Union[str, int]]) -> None:
+        """Sets the list of preloaded frames of which each line on serve's ``--trigger`` port shows the next; after the last it begins anew.
+
+        :param names: their names; none: triggers show nothing, but by a frame's name.
+        """
+        self._ask({"arm": [str(name) for name in names]})
+
+    def forget(self, *names: Union[str, int]) -> int:
+        """Keeps preloaded frames no longer.
+
+        :param names: their names; none: all.
+        :return: how many are still kept.
+        """
+        return int(self._ask({"forget": [str(name) for name in names]})["kept"])
+
+    def _shown(self, answer: dict[str, Any]) -> Shown:
+        return Shown(answer["time"], answer["number"], answer["missed"], answer["latency"])
+
+    def _send(self, array: Any, request: dict[str, Any]) -> dict[str, Any]:
+        """Puts an array into the shared memory and asks for what is to be done with it."""
         array = np.asarray(array)
         if array.shape != self.shape:
             raise ValueError("the array is %s, the panel %s (rows, columns)" % (array.shape, self.shape))
@@ -160,10 +230,9 @@ class SLM:
             if self._map is None:
                 raise Error("this SLM is closed")
             np.ndarray(self.shape, dtype, self._map)[...] = array
-            answer = self._ask({"show": kind, "dtype": dtype})
-        return Shown(answer["time"], answer["number"], answer["missed"], answer["latency"])
+            return self._ask({"show": kind, "dtype": dtype, **request})
 
-    async def show_async(self, array: ArrayLike) -> Shown:
+    async def show_async(self, array: Union[ArrayLike, str, int]) -> Shown:
         """The same for ``await``: the event loop goes on while the frame comes on the panel."""
         return await asyncio.get_running_loop().run_in_executor(None, self.show, array)
 
@@ -194,13 +263,17 @@ class SLM:
         rows, columns = self.shape
         return "<holodrive.SLM %s, %d × %d px of %d bits>" % (self.name, columns, rows, self.bits)
 
-    def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
-        try:
-            self._socket.sendall(json.dumps(request).encode() + b"\n")
-        except OSError as error:
-            self.close()
-            raise Error("the program has ended: %s" % error) from error
-        return self._answer()
+    def _ask(self, request: dict[str, Any], lasts: float = 0.0) -> dict[str, Any]:
+        with self._turn:
+            if self._lines is None or self._lines.closed:
+                raise Error("this SLM is closed")
+            try:
+                self._socket.settimeout(self._timeout + lasts)
+                self._socket.sendall(json.dumps(request).encode() + b"\n")
+            except OSError as error:
+                self.close()
+                raise Error("the program has ended: %s" % error) from error
+            return self._answer()
 
     def _answer(self) -> dict[str, Any]:
         assert self._lines is not None

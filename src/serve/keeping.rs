@@ -1,7 +1,10 @@
 //! Keeping a panel for clients: their frames through correction and level curve onto the output, their answers back.
 
 use super::output::{Output, Readiness};
-use super::{Flip, SentFrame, ServeCounts, ServedPanel, Server};
+use super::playing::play;
+use super::preloaded::Preloaded;
+use super::task::{Done, Task};
+use super::{Flip, FrameRequest, SentFrame, ServeCounts, ServedPanel, Server, ShownAt};
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::names::{Name, Named};
@@ -12,7 +15,7 @@ use crate::panel::{
 use crate::progress::Progress;
 use crate::units::show_length;
 use serde::Serialize;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Wait for a client's frame between two looks at the output. A frame that comes is shown at once.
 const TURN: Duration = Duration::from_millis(5);
@@ -40,6 +43,13 @@ pub struct KeepSettings<'a> {
     pub idle: &'a Frame,
     /// What stays when a client goes.
     pub on_client_gone: OnClientGone,
+    /// Memory for frames that are kept ready [bytes].
+    pub memory: u64,
+}
+
+impl KeepSettings<'_> {
+    /// Memory for frames that are kept ready, where nothing else is said [bytes]: 259 of 1920 × 1080 pixels.
+    pub const MEMORY: u64 = 2 << 30;
 }
 
 /// Times of the frames that were shown.
@@ -192,52 +202,110 @@ pub fn keep(
     settings: KeepSettings<'_>,
     progress: &Progress,
 ) -> Result<KeepReport> {
-    let mut report = KeepReport::default();
+    let mut keeper = Keeper {
+        driver,
+        ready: Preloaded::new(driver.grid.len(), settings.memory),
+        waited: Duration::ZERO,
+        report: KeepReport::default(),
+    };
     // The client whose frame is on the panel.
     let mut owner = None;
-    let mut waited = Duration::ZERO;
     while !progress.stopped() {
         let readiness = output.attend()?;
         if readiness == Readiness::Ended {
-            report.closed = true;
+            keeper.report.closed = true;
             break;
         }
         if settings.on_client_gone == OnClientGone::Idle && owner.is_some_and(|client| !server.is_connected(client)) {
             owner = None;
-            report.idled += 1;
+            keeper.report.idled += 1;
             // Where it is refused the monitor is away; the output keeps it for its return.
             let _ = output.show(settings.idle);
         }
         let Some(mut request) = server.next(TURN) else { continue };
-        let (arrived, client) = (request.arrived(), request.client());
-        let shown = match readiness {
+        let done = match readiness {
             Readiness::Absent { why } => Err(why),
-            Readiness::Ready | Readiness::Ended => {
-                let frame = driver.frame(request.take_frame());
-                frame.and_then(|frame| output.show(&frame)).map_err(|error| error.to_string())
-            }
+            Readiness::Ready | Readiness::Ended => keeper.serve(&mut request, output, progress),
         };
-        match shown {
-            Ok(shown) => {
-                let late = shown.at.saturating_duration_since(arrived);
-                // Every frame waits for the next refresh; those that pass meanwhile are missed.
-                let missed = output.refresh().map_or(0, |refresh| (late.as_secs_f64() / refresh) as u64);
-                waited += late;
-                owner = client;
-                report.shown += 1;
-                report.missed += missed;
-                report.latency.longest = report.latency.longest.max(late.as_secs_f64());
-                request.shown(Flip { at: shown.at, number: shown.number, missed });
+        match done {
+            Ok(done) => {
+                if done.last().is_some() {
+                    owner = request.client();
+                }
+                request.done(done);
             }
             Err(why) => {
-                report.failed += 1;
+                keeper.report.failed += 1;
                 request.refused(&why);
             }
         }
     }
-    report.latency.mean = waited.as_secs_f64() / report.shown.max(1) as f64;
+    let mut report = keeper.report;
+    report.latency.mean = keeper.waited.as_secs_f64() / report.shown.max(1) as f64;
     report.counts = server.counts();
     Ok(report)
+}
+
+/// What is kept beside the panel.
+struct Keeper<'a> {
+    driver: &'a Driver,
+    ready: Preloaded,
+    waited: Duration,
+    report: KeepReport,
+}
+
+impl Keeper<'_> {
+    /// Does what a client asks; the error is an answer to it.
+    fn serve(
+        &mut self,
+        request: &mut FrameRequest,
+        output: &mut dyn Output,
+        progress: &Progress,
+    ) -> Result<Done, String> {
+        let told = |error: Error| error.to_string();
+        let (arrived, task) = (request.arrived(), request.task().clone());
+        let shown = match task {
+            Task::Show => {
+                let frame = self.driver.frame(request.take_frame()).map_err(told)?;
+                output.show(&frame).map_err(told)?
+            }
+            Task::Recall(name) => self.ready.recall(&name, output)?,
+            Task::Next => self.ready.next(output)?,
+            Task::Play { names, rate } => {
+                let numbers = self.ready.numbers(&names)?;
+                let flips = play(&numbers, rate, request, output, progress)?;
+                self.report.shown += flips.len() as u64;
+                self.report.missed += flips.iter().map(|flip| flip.missed).sum::<u64>();
+                return Ok(Done::Played(flips));
+            }
+            Task::Preload(name) => {
+                let frame = self.driver.frame(request.take_frame()).map_err(told)?;
+                self.ready.keep(name, &frame, output)?;
+                return Ok(Done::Kept(self.ready.len()));
+            }
+            Task::Arm(names) => {
+                self.ready.arm(names)?;
+                return Ok(Done::Kept(self.ready.len()));
+            }
+            Task::Forget(names) => {
+                self.ready.forget(&names, output)?;
+                return Ok(Done::Kept(self.ready.len()));
+            }
+        };
+        Ok(Done::Shown(self.flip(shown, arrived, output)))
+    }
+
+    /// Counts a frame that arrived then.
+    fn flip(&mut self, shown: ShownAt, arrived: Instant, output: &dyn Output) -> Flip {
+        let late = shown.at.saturating_duration_since(arrived);
+        // Every frame waits for the next refresh; those that pass meanwhile are missed.
+        let missed = output.refresh().map_or(0, |refresh| (late.as_secs_f64() / refresh) as u64);
+        self.waited += late;
+        self.report.shown += 1;
+        self.report.missed += missed;
+        self.report.latency.longest = self.report.latency.longest.max(late.as_secs_f64());
+        Flip { at: shown.at, number: shown.number, missed }
+    }
 }
 
 #[cfg(test)]

@@ -16,7 +16,9 @@
 //! {"number": 7, "time": 5121.034512, "missed": 0}
 //! ```
 //!
-//! with the time at which it was handed over on the system's monotonic clock [s], or `{"error": "…"}`. Phases and amplitudes go
+//! with the time at which it was handed over on the system's monotonic clock [s], or `{"error": "…"}`. Frames are kept ready by
+//! adding `"preload": "NAME"`, and then `{"recall": "NAME"}`, `{"play": ["NAME", …], "rate": 60.0}` and `{"arm": ["NAME", …]}` need
+//! no array; `{"forget": ["NAME", …]}` gives up some, or all. Phases and amplitudes go
 //! through the panel's correction and level curve here; levels are final.
 //!
 //! # Why it is made so
@@ -29,12 +31,13 @@
 //! writing spoils its own frame only.
 
 use super::clock::monotonic_seconds;
-use super::{Flip, SentFrame, ServedPanel};
+use super::local_request::{ArrayType, Dtype, Quantity};
+use super::task::Done;
+use super::{SentFrame, ServedPanel};
 use crate::error::{Error, Result};
 use crate::panel::Modulation;
 use rayon::prelude::*;
 use rustix::process::geteuid;
-use serde::Deserialize;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 use std::fs::{self, DirBuilder, File, OpenOptions};
@@ -47,8 +50,6 @@ use std::time::Instant;
 
 /// Version of the protocol.
 const VERSION: u32 = 1;
-/// Longest request [bytes]; real ones have about fifty.
-pub(super) const LINE_LIMIT: usize = 1024;
 /// Bytes of a pixel in the widest type that is taken.
 const WIDEST: usize = 8;
 
@@ -197,66 +198,6 @@ impl Drop for Buffer {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Quantity {
-    Phase,
-    Amplitude,
-    Levels,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Dtype {
-    Uint8,
-    Uint16,
-    Float32,
-    Float64,
-}
-
-/// What the array in the buffer is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct ArrayType {
-    quantity: Quantity,
-    dtype: Dtype,
-}
-
-/// What a client says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Command {
-    /// It has mapped the buffer.
-    Mapped,
-    /// What is in the buffer is to be shown.
-    Show(ArrayType),
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Request {
-    #[serde(default)]
-    mapped: bool,
-    show: Option<Quantity>,
-    dtype: Option<Dtype>,
-}
-
-/// Reads a request: the line without its end. The error is an answer to the client.
-pub(super) fn read(line: &[u8]) -> Result<Command, String> {
-    let request: Request =
-        serde_json::from_slice(line).map_err(|error| format!("The request is not understood: {error}."))?;
-    match request {
-        Request { mapped: true, show: None, dtype: None } => Ok(Command::Mapped),
-        Request { mapped: false, show: Some(quantity), dtype: Some(dtype) } => {
-            let levels = matches!(dtype, Dtype::Uint8 | Dtype::Uint16);
-            if levels == (quantity == Quantity::Levels) {
-                Ok(Command::Show(ArrayType { quantity, dtype }))
-            } else {
-                Err("Levels are uint8 or uint16; phases and amplitudes are float32 or float64.".into())
-            }
-        }
-        _ => Err("A request is {\"show\": …, \"dtype\": …} or {\"mapped\": true}.".into()),
-    }
-}
-
 fn line(value: &Value) -> String {
     value.to_string() + "\n"
 }
@@ -289,14 +230,26 @@ pub(super) fn done() -> String {
     line(&json!({}))
 }
 
-/// The answer to a frame that is on the panel. `arrived`: when its request came in.
-pub(super) fn answer(flip: &Flip, arrived: Instant) -> String {
-    line(&json!({
-        "number": flip.number,
-        "time": monotonic_seconds(flip.at),
-        "missed": flip.missed,
-        "latency": flip.at.saturating_duration_since(arrived).as_secs_f64(),
-    }))
+/// The answer to a task that was done. `arrived`: when its request came in.
+pub(super) fn answer(done: &Done, arrived: Instant) -> String {
+    line(&match done {
+        Done::Shown(flip) => json!({
+            "number": flip.number,
+            "time": monotonic_seconds(flip.at),
+            "missed": flip.missed,
+            "latency": flip.at.saturating_duration_since(arrived).as_secs_f64(),
+        }),
+        Done::Played(flips) => json!({
+            "first": flips.first().map(|flip| flip.number),
+            // Microseconds: the line stays within what clients read as one.
+            "times": flips
+                .iter()
+                .map(|flip| monotonic_seconds(flip.at).map(|time| (time * 1e6).round() / 1e6))
+                .collect::<Vec<_>>(),
+            "missed": flips.iter().map(|flip| flip.missed).collect::<Vec<_>>(),
+        }),
+        Done::Kept(frames) => json!({ "kept": frames }),
+    })
 }
 
 /// The answer to a request that was refused.
@@ -307,7 +260,6 @@ pub(super) fn refusal(why: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
 
     fn panel(modulation: Modulation) -> ServedPanel {
         ServedPanel {
@@ -375,27 +327,6 @@ mod tests {
     }
 
     #[test]
-    fn requests_are_read_and_others_answered() {
-        let ask = |text: &str| read(text.as_bytes());
-        let wanted = array(Quantity::Phase, Dtype::Float32);
-        assert_eq!(ask(r#"{"show": "phase", "dtype": "float32"}"#), Ok(Command::Show(wanted)));
-        assert_eq!(ask(r#"{"mapped": true}"#), Ok(Command::Mapped));
-        for wrong in [
-            "",
-            "{}",
-            "[]",
-            "{\"show\": \"phase\"}",
-            r#"{"show": "phase", "dtype": "uint8"}"#,
-            r#"{"show": "levels", "dtype": "float64"}"#,
-            r#"{"show": "levels", "dtype": "int64"}"#,
-            r#"{"show": "levels", "dtype": "uint8", "path": "/etc/passwd"}"#,
-            r#"{"mapped": true, "show": "phase", "dtype": "float32"}"#,
-        ] {
-            assert!(ask(wrong).is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
     fn a_socket_is_taken_once_and_a_dead_ones_is_taken_over() {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("own").join("panel.sock");
@@ -413,12 +344,5 @@ mod tests {
         fs::write(&path, "a file").expect("write");
         assert!(LocalSocket::take(&path).is_err());
         assert!(path.exists(), "somebody's file was removed");
-    }
-
-    proptest! {
-        #[test]
-        fn any_bytes_are_judged_without_panic(line in prop::collection::vec(any::<u8>(), 0..100)) {
-            let _ = read(&line);
-        }
     }
 }

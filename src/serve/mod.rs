@@ -5,6 +5,9 @@
 //! it, and says so by [`FrameRequest::shown`], upon which the client gets its answer. [`keep`] is that for any [`Output`],
 //! so that the same server stands before a real panel and a simulated one ([`SimulatedOutput`]).
 //!
+//! In step with an experiment, frames are kept ready under names ([`Task::Preload`]), shown by name, played at a rate, or one
+//! after another as a line of text comes on a port of its own ([`ServeSettings::trigger`]).
+//!
 //! slmsuite's and slmPy's protocols are neither encrypted nor authenticated: an address other than loopback lets the whole
 //! network write on the panel. Whatever a client sends, nothing is held that is longer than a frame of the panel can be;
 //! silent clients are cut off inside a request, and the longest silent one when there are too many.
@@ -47,23 +50,30 @@ mod conversation;
 mod keeping;
 #[cfg(unix)]
 mod local;
+#[cfg(unix)]
+mod local_request;
 mod log;
 mod output;
+mod playing;
+mod preloaded;
 mod slmpy;
 mod slmsuite;
 mod stream;
+mod task;
+mod trigger;
 
 pub use clock::monotonic_seconds;
 pub use connections::Server;
 pub use keeping::{Driver, KeepReport, KeepSettings, Latency, OnClientGone, keep};
-pub use output::{Output, Readiness, ShownAt, SimulatedOutput};
+pub use output::{Output, Readiness, ShownAt, SimulatedOutput, not_ready};
+pub use task::{Done, MOST_PLAYED, Task};
 
 use crate::panel::Modulation;
 use serde::Serialize;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
@@ -125,6 +135,9 @@ pub struct ServeSettings {
     pub slmpy: Option<SocketAddr>,
     /// Socket for the local protocol, if it is to be spoken.
     pub local: Option<PathBuf>,
+    /// Address for triggers, if they are to be heard: a line of text shows the next frame of the armed list, or the one of
+    /// that name. Port 0: a free one.
+    pub trigger: Option<SocketAddr>,
     /// Whether slmsuite's levels stand for phases that the panel's correction and curve are still to be applied to.
     pub calibrated: bool,
     /// Time after a frame's flip at which it is answered: none, or the panel's settle time.
@@ -145,6 +158,7 @@ impl Default for ServeSettings {
             slmsuite: loopback(5025),
             slmpy: loopback(9999),
             local: None,
+            trigger: None,
             calibrated: false,
             settle: Duration::ZERO,
             log: None,
@@ -174,6 +188,8 @@ pub struct Announcement {
     pub slmpy: Option<SocketAddr>,
     /// Socket of the local protocol.
     pub local: Option<PathBuf>,
+    /// Address of triggers.
+    pub trigger: Option<SocketAddr>,
 }
 
 /// What has come in so far.
@@ -198,26 +214,32 @@ pub struct Flip {
     pub missed: u64,
 }
 
-/// A frame that a client wants shown; it waits for the answer.
+/// What a client wants of the panel, usually a frame shown; it waits for the answer.
 #[derive(Debug)]
 pub struct FrameRequest {
+    task: Task,
     frame: SentFrame,
     arrived: Instant,
     client: Option<u64>,
-    answer: SyncSender<Result<Flip, String>>,
+    answer: SyncSender<Result<Done, String>>,
     /// Set once the client was told that it has waited too long.
     abandoned: Arc<AtomicBool>,
 }
 
 impl FrameRequest {
-    /// The frame.
+    /// What is to be done.
+    pub fn task(&self) -> &Task {
+        &self.task
+    }
+
+    /// The frame, of tasks that bring one; else an empty one.
     pub fn frame(&self) -> &SentFrame {
         &self.frame
     }
 
     /// The frame, out of the request: an empty one stays in it.
     pub fn take_frame(&mut self) -> SentFrame {
-        std::mem::replace(&mut self.frame, SentFrame::Levels(Vec::new()))
+        std::mem::take(&mut self.frame)
     }
 
     /// When all of it had come.
@@ -230,15 +252,31 @@ impl FrameRequest {
         self.client
     }
 
+    /// Whether its client has gone, or was told that it has waited too long.
+    pub fn is_abandoned(&self) -> bool {
+        self.abandoned.load(Ordering::SeqCst)
+    }
+
     /// Tells the client that the frame is on the panel.
     pub fn shown(self, flip: Flip) {
+        self.done(Done::Shown(flip));
+    }
+
+    /// Tells the client what came of its task.
+    pub fn done(self, done: Done) {
         // A client that has gone needs no answer.
-        let _ = self.answer.send(Ok(flip));
+        let _ = self.answer.send(Ok(done));
     }
 
     /// Tells the client why it is not.
     pub fn refused(self, why: &str) {
         let _ = self.answer.send(Err(why.to_owned()));
+    }
+}
+
+impl Default for SentFrame {
+    fn default() -> Self {
+        Self::Levels(Vec::new())
     }
 }
 

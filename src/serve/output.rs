@@ -1,8 +1,9 @@
 //! What shows the frames that are served: a real panel's window, or the simulated panel.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::files;
 use crate::panel::Frame;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -43,14 +44,35 @@ pub trait Output {
     /// When this frame cannot be shown; the one before stays.
     fn show(&mut self, frame: &Frame) -> Result<ShownAt>;
 
+    /// Makes a frame ready under a number, in place of one that has it: [`Output::recall`] then shows it without delay.
+    ///
+    /// # Errors
+    /// When this frame could not be shown.
+    fn preload(&mut self, number: u64, frame: &Frame) -> Result<()>;
+
+    /// Shows the frame that was made ready under a number; returns when it was handed over.
+    ///
+    /// # Errors
+    /// As [`Output::show`]; [`crate::Error::Parameter`] for a number that no frame has.
+    fn recall(&mut self, number: u64) -> Result<ShownAt>;
+
+    /// Keeps the frame of a number no longer.
+    fn forget(&mut self, number: u64);
+
     /// Time from one refresh to the next [s], where there are any.
     fn refresh(&self) -> Option<f64>;
+}
+
+/// What [`Output::recall`] says of a number that no frame has.
+pub fn not_ready(number: u64) -> Error {
+    Error::parameter("frame", format!("none was made ready under the number {number}"))
 }
 
 /// The simulated panel: takes frames at once, and keeps them as files from which `reconstruct` shows what would be seen.
 pub struct SimulatedOutput {
     folder: Option<PathBuf>,
     number: u64,
+    ready: HashMap<u64, Frame>,
 }
 
 impl SimulatedOutput {
@@ -62,7 +84,7 @@ impl SimulatedOutput {
         if let Some(folder) = folder {
             files::output_folder(folder)?;
         }
-        let output = Self { folder: folder.map(Path::to_path_buf), number: 0 };
+        let output = Self { folder: folder.map(Path::to_path_buf), number: 0, ready: HashMap::new() };
         output.keep(idle)?;
         Ok(output)
     }
@@ -84,6 +106,22 @@ impl Output for SimulatedOutput {
         self.number += 1;
         self.keep(frame)?;
         Ok(ShownAt { at: Instant::now(), number: self.number })
+    }
+
+    fn preload(&mut self, number: u64, frame: &Frame) -> Result<()> {
+        self.ready.insert(number, frame.clone());
+        Ok(())
+    }
+
+    fn recall(&mut self, number: u64) -> Result<ShownAt> {
+        let frame = self.ready.remove(&number).ok_or_else(|| not_ready(number))?;
+        let shown = self.show(&frame);
+        self.ready.insert(number, frame);
+        shown
+    }
+
+    fn forget(&mut self, number: u64) {
+        self.ready.remove(&number);
     }
 
     fn refresh(&self) -> Option<f64> {

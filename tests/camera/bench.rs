@@ -130,10 +130,15 @@ impl HiddenBench {
 
     /// A photo of these levels, exposed so that a thousandth of the pixels is above 85 % of full scale: 8 bits with noise.
     pub(crate) fn photo(&self, levels: &[u16], seed: u64) -> CameraPhoto {
+        self.exposed(levels, seed, 999)
+    }
+
+    /// The same with so many of a thousand pixels below 85 % of full scale.
+    pub(crate) fn exposed(&self, levels: &[u16], seed: u64, below: usize) -> CameraPhoto {
         let clean = self.brightness(levels);
         let mut sorted = clean.clone();
         sorted.sort_by(f64::total_cmp);
-        let top = sorted[sorted.len() * 999 / 1000];
+        let top = sorted[sorted.len() * below / 1000];
         let mut random = Random::new(seed, 5);
         let mut shown = |v: &f64| {
             let noise = (-2.0 * (1.0 - random.uniform()).ln()).sqrt() * (TAU * random.uniform()).cos();

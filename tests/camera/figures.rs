@@ -66,7 +66,7 @@ pub(crate) fn errors(bench: &HiddenBench, profile: &PanelProfile, fit: &CameraFi
         let at = [(k % 30) as f64 / 29.0 * bench.camera[0] as f64, (k / 30) as f64 / 29.0 * bench.camera[1] as f64];
         let truth = bench.frequency(at[0], at[1]);
         if truth.iter().all(|f| f.abs() < half) {
-            let seen = fit.mapping.frequency(at);
+            let seen = fit.camera.mapping.frequency(at);
             // A tilt that the wavefront has not is a shift of the mapping.
             let shift = [tilt[0] / TAU * 2.0 / width as f64, tilt[1] / TAU * 2.0 / height as f64];
             misses.push((seen[0] - shift[0] - truth[0]).hypot(seen[1] - shift[1] - truth[1]) / scale);

@@ -3,6 +3,7 @@
 mod bench;
 mod eye;
 mod figures;
+mod in_loop;
 
 use bench::HiddenBench;
 use holodrive::calibration::{CameraBench, CameraPhoto, calibrate_camera, camera_frames};
@@ -59,6 +60,11 @@ fn a_hidden_bench_is_told_by_a_dot_card_and_ten_patterns() {
     println!("perfect panel {perfect:.2} dB, before {before:.2} dB, after {after:.2} dB");
     // A panel whose pixels run into each other shows less than a perfect one, but far more than before.
     assert!(after > before + 6.0, "{perfect} {before} {after}");
+    // A picture in the focal plane: what the profile does not know of the bench is corrected by photos.
+    let ([model, photographed], report) = in_loop::corrected(&bench, &calibrated, &fit.camera, errors.tilt, 16);
+    println!("{model:.2} dB by the model, {photographed:.2} dB by photos; {report:?}");
+    let (first, best) = (report.photo_psnr[0], report.photo_psnr.iter().copied().fold(f64::MIN, f64::max));
+    assert!(best > first + 0.8 && photographed > model + 0.2, "{model} {photographed} {report:?}");
     // Photos of other patterns do not pass for these.
     let mut swapped = photos;
     swapped[1..].rotate_left(1);
@@ -113,4 +119,34 @@ fn the_program_calibrates_by_a_command_that_takes_photos() {
     assert!((made.unmodulated - bench::UNMODULATED).abs() < 0.01 && (made.crosstalk - bench::CROSSTALK).abs() < 0.03);
     let beam = made.beam_amplitude().expect("read").expect("a beam");
     assert_eq!(beam.len(), bench.width * bench.height);
+    // A picture with that camera in the loop. The first frame is the same in each run: the camera is told its photo.
+    let (width, height, light) = in_loop::picture();
+    let codes: Vec<u8> = light.iter().map(|v| (255.0 * v.powf(1.0 / 2.2)).round() as u8).collect();
+    image::save_buffer(f.join("picture.png"), &codes, width as u32, height as u32, image::ColorType::L8)
+        .expect("picture");
+    let base = ["encode", "picture.png", "--panel", "mine.toml", "-o", "corrected.png", "--iterations", "30"];
+    let in_loop = |camera: &str, command: &str| -> Output {
+        run(&[&base[..], &["--in-the-loop", camera, "--camera-photos", "1", "--camera-command", command]].concat())
+    };
+    let refused = |out: &Output, word: &str| {
+        let told = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.code() == Some(2) && told.contains(word), "{told}");
+        assert!(!f.join("corrected.png").exists());
+    };
+    refused(&in_loop("none.json", "true {photo}"), "none.json");
+    refused(&in_loop("mine.toml", "true {photo}"), "calibrate camera");
+    refused(&in_loop("mine-camera.json", "true"), "{photo}");
+    refused(&in_loop("mine-camera.json", "cp {frame} first.png; true {photo}"), "no photo photo-000");
+    let (first, _) = holodrive::panel::Frame::read(&f.join("first.png"), None, None).expect("frame");
+    for (name, levels) in [("other.png", vec![7; first.levels.len()]), ("seen.png", first.levels.clone())] {
+        let photo = bench.photo(&levels, 3);
+        let pixels: Vec<u8> = photo.values.iter().map(|v| (255.0 * v).round() as u8).collect();
+        let size = (photo.width as u32, photo.height as u32);
+        image::save_buffer(f.join(name), &pixels, size.0, size.1, image::ColorType::L8).expect("photo");
+    }
+    refused(&in_loop("mine-camera.json", "cp other.png {photo}.png"), "not like what the panel should show");
+    let out = in_loop("mine-camera.json", "cp seen.png {photo}.png");
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let (frame, _) = holodrive::panel::Frame::read(&f.join("corrected.png"), None, None).expect("frame");
+    assert_eq!(frame.levels, first.levels);
 }

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
+from typing import Iterator
 
 import holodrive as hd
 import numpy as np
@@ -33,6 +35,19 @@ def wide() -> hd.Panel:
 @pytest.fixture(scope="session")
 def room() -> hd.Scene:
     return hd.Scene.load(ROOT / "scenes" / "cornell.gltf")
+
+
+@pytest.fixture
+def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> "Iterator[hd.Served]":
+    if sys.platform == "win32":
+        pytest.skip("the local protocol is Unix's")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    profile = (ROOT / "calib" / "generic.toml").read_text()
+    profile = profile.replace("width = 1920", "width = 320").replace("height = 1080", "height = 200")
+    (tmp_path / "small.toml").write_text(profile)
+    arguments = ("--local", "--trigger", "0")
+    with hd.serve(tmp_path / "small.toml", name="bench", output=tmp_path / "frames", arguments=arguments) as running:
+        yield running
 
 
 def sphere(

@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Any, Iterator
+from typing import Any
 
 import holodrive as hd
 import numpy as np
@@ -123,18 +123,6 @@ def test_calls_take_no_longer_than_the_program(tmp_path: Path) -> None:
     assert spent < 1.05 * inside
     # These are timed one after the other on a machine that does other things, too.
     assert ours < 1.25 * theirs
-
-
-@pytest.fixture
-def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> "Iterator[hd.Served]":
-    if sys.platform == "win32":
-        pytest.skip("the local protocol is Unix's")
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    profile = (ROOT / "calib" / "generic.toml").read_text()
-    profile = profile.replace("width = 1920", "width = 320").replace("height = 1080", "height = 200")
-    (tmp_path / "small.toml").write_text(profile)
-    with hd.serve(tmp_path / "small.toml", name="bench", output=tmp_path / "frames") as running:
-        yield running
 
 
 def test_a_panel_is_served_in_the_background(served: hd.Served, tmp_path: Path) -> None:

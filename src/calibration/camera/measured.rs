@@ -1,8 +1,8 @@
 //! What a camera told of a panel: maps, curve and figures with their uncertainties, and the profile that keeps them.
 
 use super::fit::Found;
-use super::mapping::Mapping;
 use super::panel_light::{CURVE, PanelLight};
+use super::registered::CameraView;
 use super::shapes::{Products, place};
 use crate::calibration::profile_name;
 use crate::error::Result;
@@ -73,8 +73,8 @@ pub struct CameraFit {
     pub beam: Vec<f32>,
     /// Level → phase by region, counted from the unmodulated light's phase.
     pub curve: Curve,
-    /// Camera pixels → Fourier plane.
-    pub mapping: Mapping,
+    /// Where the camera stands.
+    pub camera: CameraView,
     /// Amplitude of the unmodulated light against the modulated.
     pub unmodulated: f64,
     /// Figures.
@@ -109,7 +109,7 @@ impl CameraFit {
             wavefront,
             beam,
             curve,
-            mapping: model.mapping(values),
+            camera: CameraView { mapping: model.mapping(values), half_window: model.zoom.half() },
             unmodulated: share.norm(),
             report,
             wavelength,
@@ -138,7 +138,8 @@ impl CameraFit {
         out
     }
 
-    /// Writes the profile (`mine.toml`) with the maps beside it (`mine-correction.npy`, `mine-beam.npy`): all or none.
+    /// Writes the profile (`mine.toml`) with the maps (`mine-correction.npy`, `mine-beam.npy`) and the camera's place
+    /// (`mine-camera.json`) beside it: all or none.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] for a profile whose name does not end in `.toml`; [`crate::Error::Io`].
@@ -150,13 +151,15 @@ impl CameraFit {
         let remark = format!("{}, calibrated by camera at {}", profile.name, show_length(self.wavelength));
         let text = made.to_toml(&[remark])?;
         let [correction, beam] = [correction, beam].map(|name| output.with_file_name(name));
+        let camera = output.with_file_name(format!("{stem}-camera.json"));
         let all = || -> Result<()> {
             self.wavefront.clone().conjugate().write(&correction)?;
             npy::write_intensity(&beam, self.wavefront.width, self.wavefront.height, &self.beam)?;
+            self.camera.write(&camera)?;
             files::write_bytes(output, text.as_bytes())
         };
         all().inspect_err(|_| {
-            for path in [correction.clone(), npy::metadata_path(&correction), beam.clone()] {
+            for path in [correction.clone(), npy::metadata_path(&correction), beam.clone(), camera.clone()] {
                 // What was written before the refusal goes again.
                 let _ = std::fs::remove_file(path);
             }

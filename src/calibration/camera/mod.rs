@@ -27,6 +27,7 @@ mod model;
 mod panel_light;
 mod patterns;
 mod photo;
+mod registered;
 mod shapes;
 mod slopes;
 mod solve;
@@ -35,8 +36,9 @@ mod zoom;
 pub use fit::CameraBench;
 pub use mapping::{MAPPING, Mapping};
 pub use measured::{CameraFit, CameraReport};
-pub use patterns::{RANDOM, camera_frames, camera_photo_file, photo_name};
+pub use patterns::{PHOTO_ENDINGS, RANDOM, camera_frames, camera_photo_file, photo_file, photo_name};
 pub use photo::CameraPhoto;
+pub use registered::CameraView;
 
 use crate::error::Result;
 use crate::panel::PanelProfile;

@@ -70,8 +70,18 @@ pub fn photo_name(k: usize) -> String {
 /// # Errors
 /// [`Error::Input`] where there is none, or more than one.
 pub fn camera_photo_file(folder: &Path, k: usize) -> Result<PathBuf> {
-    let name = photo_name(k);
-    let all = ["npy", "png", "tif", "tiff", "bmp"].map(|ending| folder.join(format!("{name}.{ending}")));
+    photo_file(folder, &photo_name(k))
+}
+
+/// Endings of the files that [`super::CameraPhoto::read`] knows.
+pub const PHOTO_ENDINGS: [&str; 5] = ["npy", "png", "tif", "tiff", "bmp"];
+
+/// The file of the photo of that name in a folder: with one of [`PHOTO_ENDINGS`].
+///
+/// # Errors
+/// [`Error::Input`] where there is none, or more than one.
+pub fn photo_file(folder: &Path, name: &str) -> Result<PathBuf> {
+    let all = PHOTO_ENDINGS.map(|ending| folder.join(format!("{name}.{ending}")));
     let mut there = all.iter().filter(|path| path.exists());
     match (there.next(), there.next()) {
         (Some(path), None) => Ok(path.clone()),

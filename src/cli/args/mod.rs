@@ -139,7 +139,7 @@ pub(crate) enum Command {
     Propagate(PropagateArgs),
     /// Encode a field, or a picture at depths, as a frame of drive levels for a panel.
     #[command(
-        after_long_help = "Examples:\n  holodrive encode field.npy --encoding double-phase -o frame.png\n  holodrive encode field.npy --encoding double-phase --blaze 0.6deg --lens 300mm -o frame.png\n  holodrive encode picture.png --encoding weighted --depths -100mm -o frame.png\n  holodrive encode rgb.png+depth.png --encoding plane-gradient --depths -100mm,-120mm,-150mm -o frame.png\n  holodrive encode cornell.npz --encoding view -o frame.png"
+        after_long_help = "Examples:\n  holodrive encode field.npy --encoding double-phase -o frame.png\n  holodrive encode field.npy --encoding double-phase --blaze 0.6deg --lens 300mm -o frame.png\n  holodrive encode picture.png --encoding weighted --depths -100mm -o frame.png\n  holodrive encode rgb.png+depth.png --encoding plane-gradient --depths -100mm,-120mm,-150mm -o frame.png\n  holodrive encode cornell.npz --encoding view -o frame.png\n  holodrive encode picture.png --panel lab.toml --in-the-loop lab-camera.json --camera-command './take {frame} {photo}' -o corrected.png"
     )]
     Encode(EncodeArgs),
     /// Reconstruct what is seen of a frame or a field: on a plane, or through an eye.
@@ -182,7 +182,7 @@ pub(crate) enum Command {
     /// Runs until Ctrl-C, or Esc on the panel. The first line says where clients come in (with --json: one line of JSON with
     /// the ports that it got); the report comes at the end.
     #[command(
-        after_long_help = "Examples:\n  holodrive serve --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive serve --panel generic --monitor none --slmsuite 0 --json --log clients.log\n  holodrive serve --panel mine.toml --monitor HDMI-1 --local --on-client-gone idle --idle flat.png\n  holodrive serve --write-python holodrive.py"
+        after_long_help = "Examples:\n  holodrive serve --panel holoeye-pluto-2.1 --monitor edid:HE-PLUTO\n  holodrive serve --panel generic --monitor none --slmsuite 0 --json --log clients.log\n  holodrive serve --panel mine.toml --monitor HDMI-1 --local --on-client-gone idle --idle flat.png\n  holodrive serve --panel generic --monitor none --local --trigger 5026\n  holodrive serve --write-python holodrive.py"
     )]
     Serve(ServeArgs),
     /// List the built-in panel profiles, and which of their figures nobody has checked.

@@ -5,6 +5,7 @@ use super::parse::one_of;
 #[cfg(feature = "display")]
 use crate::display::Presenter;
 use crate::serve::OnClientGone;
+use crate::units;
 use clap::{Args, ValueEnum};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
@@ -33,6 +34,13 @@ pub(crate) struct ServeArgs {
     /// Speak the local protocol of holodrive.py on this socket [default: NAME.sock in the user's runtime folder].
     #[arg(help_heading = "Protocols", long, value_name = "SOCKET", num_args = 0..=1)]
     pub(crate) local: Option<Option<PathBuf>>,
+    /// Hear triggers on this port, 0: a free one. A line of text shows the next frame of the list that a local client has
+    /// armed (SLM.arm), or the preloaded frame of that name; the answer is its number, time and missed refreshes.
+    #[arg(help_heading = "Protocols", long, value_name = "PORT")]
+    pub(crate) trigger: Option<u16>,
+    /// Memory for the frames that clients preload.
+    #[arg(hide_short_help = true, help_heading = "Protocols", long, value_parser = units::memory, default_value = "2GB", value_name = "SIZE")]
+    pub(crate) preload: u64,
     /// Address to listen on. Other machines may then write on the panel: neither protocol asks who sends.
     #[arg(help_heading = "Protocols", long, default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), value_name = "ADDRESS")]
     pub(crate) listen: IpAddr,

@@ -135,9 +135,38 @@ pub(crate) struct EncodeArgs {
     /// Several frames of a light field, shown faster than an eye sees; files get -000, -001 …
     #[arg(help_heading = "Viewer", long, default_value_t = 1, value_name = "N")]
     pub(crate) subframes: usize,
+    #[command(flatten)]
+    pub(crate) camera: LoopArgs,
     /// What was typed and is of no use for this input.
     #[arg(skip)]
     pub(crate) idle: Option<String>,
+}
+
+/// A camera that looks at the frame while it is found.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Camera in the loop")]
+pub(crate) struct LoopArgs {
+    /// Place the picture in the focal plane of a lens, and correct the frame by photos of it: where the camera stands, as
+    /// `calibrate camera` wrote it (mine-camera.json; its profile is --panel).
+    #[arg(hide_short_help = true, long, value_name = "FILE", requires = "camera_command")]
+    pub(crate) in_the_loop: Option<PathBuf>,
+    /// Command that shows a frame and takes its photo: {frame} is the frame's PNG, {photo} the photo's path without an ending.
+    #[arg(hide_short_help = true, long, value_name = "COMMAND", requires = "in_the_loop")]
+    pub(crate) camera_command: Option<String>,
+    /// Photos that are taken.
+    #[arg(hide_short_help = true, long, default_value_t = 30, value_name = "N", requires = "in_the_loop")]
+    pub(crate) camera_photos: usize,
+    /// Room for the picture, in halves of the window of the focal plane that was calibrated, right and up from the axis.
+    #[arg(hide_short_help = true, long, default_value = "-0.9,0.15,0.9,0.9", value_parser = four, allow_hyphen_values = true, value_name = "LEFT,BOTTOM,RIGHT,TOP", requires = "in_the_loop")]
+    pub(crate) room: [f64; 4],
+}
+
+/// Four numbers.
+fn four(text: &str) -> Result<[f64; 4], String> {
+    let numbers: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    let commas = text.matches(',').count();
+    let four = numbers.try_into().ok().filter(|_| commas == 3);
+    four.ok_or_else(|| format!("\"{text}\" is not four numbers, such as -0.9,0.15,0.9,0.9"))
 }
 
 /// How a picture is laid onto the panel.

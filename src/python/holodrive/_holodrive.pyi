@@ -20,6 +20,8 @@ Lengths: TypeAlias = Length | tuple[Length, Length]
 Place: TypeAlias = tuple[Length, Length, Length]
 #: Diameter, or all of the panel's light.
 Pupil: TypeAlias = Length | Literal["all"]
+#: Wavelengths of three lasers, or those that the panel's profile names.
+Lasers: TypeAlias = tuple[Length, Length, Length] | Literal["panel"]
 PathLike: TypeAlias = str | os.PathLike[str]
 
 class Bar(Protocol):
@@ -118,6 +120,21 @@ class Scene:
     def load(
         path: PathLike,
         *,
+        camera: str | int | None = None,
+        animation: str | int | None = None,
+        time: float = 0.0,
+        environment: PathLike | None = None,
+        viewer_light: bool = False,
+        bounces: int = 32,
+        photons: int | None = None,
+        seed: int = 1,
+        progress: Progress = None,
+    ) -> Scene: ...
+    @staticmethod
+    def from_bytes(
+        data: bytes | bytearray,
+        *,
+        name: str = "bytes",
         camera: str | int | None = None,
         animation: str | int | None = None,
         time: float = 0.0,
@@ -287,9 +304,11 @@ class Picture:
     def save(self, path: PathLike, white: float | None = None) -> None: ...
     def _repr_png_(self) -> bytes: ...
 
+def _worked() -> float: ...
 def panels() -> list[str]: ...
 def length(value: Length) -> float: ...
 def program(arguments: Sequence[PathLike]) -> int: ...
+@overload
 def hologram(
     points: Points,
     panel: Panel,
@@ -297,9 +316,21 @@ def hologram(
     error: float = 1e-3,
     engine: str | None = None,
     channel: str = "luminance",
+    wavelengths: None = None,
     memory: int | str | None = None,
     progress: Progress = None,
 ) -> Field: ...
+@overload
+def hologram(
+    points: Points,
+    panel: Panel,
+    *,
+    wavelengths: Lasers,
+    error: float = 1e-3,
+    engine: str | None = None,
+    memory: int | str | None = None,
+    progress: Progress = None,
+) -> list[Field | None]: ...
 def propagate(
     field: Field,
     distance: Length,
@@ -334,9 +365,40 @@ def encode(
     pupil: Pupil | None = None,
     eye_box: Lengths | None = None,
     subframes: None = None,
+    wavelengths: None = None,
     seed: int = 1,
     progress: Progress = None,
 ) -> Frame: ...
+@overload
+def encode(
+    source: list[Field | None],
+    panel: Panel,
+    *,
+    encoding: str | None = None,
+    iterations: int | None = None,
+    depths: Sequence[Length] | None = None,
+    start: str | None = None,
+    reference_angle: tuple[Angle, Angle] | None = None,
+    blaze: tuple[Angle, Angle] | None = None,
+    lens: Length | None = None,
+    stop: Angle | None = None,
+    seed: int = 1,
+    progress: Progress = None,
+) -> list[Frame | None]: ...
+@overload
+def encode(
+    source: Scene | Points | LightField,
+    panel: Panel,
+    *,
+    wavelengths: Lasers,
+    encoding: Literal["view"] | None = None,
+    iterations: int | None = None,
+    eye: Place | None = None,
+    pupil: Pupil | None = None,
+    eye_box: Lengths | None = None,
+    seed: int = 1,
+    progress: Progress = None,
+) -> list[Frame | None]: ...
 @overload
 def encode(
     source: Scene | Points | LightField,
@@ -351,6 +413,29 @@ def encode(
     seed: int = 1,
     progress: Progress = None,
 ) -> list[Frame]: ...
+def calibrate_camera(
+    show: Callable[[NDArray[Any]], object],
+    photograph: Callable[[], ArrayLike],
+    panel: Panel,
+    *,
+    lens: Length,
+    camera_pitch: Length,
+    output: PathLike | None = None,
+    progress: Progress = None,
+) -> dict[str, Any]: ...
+def encode_in_the_loop(
+    picture: ArrayLike,
+    panel: Panel,
+    camera: PathLike,
+    show: Callable[[NDArray[Any]], object],
+    photograph: Callable[[], ArrayLike],
+    *,
+    room: tuple[float, float, float, float] = (-0.9, 0.15, 0.9, 0.9),
+    iterations: int = 150,
+    photos: int = 30,
+    step: float = 0.05,
+    progress: Progress = None,
+) -> Frame: ...
 def reconstruct(
     light: Frame | Field,
     z: Length,

@@ -1,11 +1,11 @@
 //! Fields, phases and light fields to frames.
 
 use crate::errors::{Raise, refused};
-use crate::field::Given;
+use crate::field::{Field, Given};
 use crate::frame::Frame;
 use crate::light_field::{Content, Looking, PupilGiven, views};
 use crate::panel::Panel;
-use crate::quantities::{Angle, Length, Lengths, Place, named};
+use crate::quantities::{Angle, Length, Lengths, Place, Three, named};
 use crate::run::run;
 use holodrive::encode::view::Viewed;
 use holodrive::encode::{EncodeOptions, Encoding, PlaneStart, Reference, ViewEncoding};
@@ -76,7 +76,7 @@ fn for_an_eye<'py>(
     view: ViewEncoding,
     sub_frames: Option<SubFrames>,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Vec<Frame>> {
+) -> PyResult<Vec<Option<Frame>>> {
     let viewer = looking.viewer(content.views());
     let source = content.source(&viewer);
     let settings = Settings { viewer, sub_frames, ..Settings::default() };
@@ -84,7 +84,7 @@ fn for_an_eye<'py>(
         let light = views(&source, setup, viewer, Channel::Luminance, progress)?;
         let exposures = pipeline::exposures(setup, &settings, None);
         let found = pipeline::views(&light, &viewer, &exposures, setup, &view, &[], progress)?;
-        let frames = found.into_iter().flat_map(Viewed::frames_or_none).flatten();
+        let frames = found.into_iter().flat_map(Viewed::frames_or_none);
         let told = |source: &LightSource| match source {
             LightSource::Views(_) => "a light field",
             LightSource::Scene { .. } => "a scene",
@@ -92,13 +92,13 @@ fn for_an_eye<'py>(
         };
         let origin = Origin { source: Some(told(&source).into()), depth: Some(light.depth), ..Origin::default() };
         let mut frames: Vec<_> = frames.collect();
-        frames.iter_mut().for_each(|encoded| encoded.frame.metadata.origin = origin.clone());
+        frames.iter_mut().flatten().for_each(|encoded| encoded.frame.metadata.origin = origin.clone());
         Ok(frames)
     })?;
-    if found.is_empty() {
+    if found.iter().all(Option::is_none) {
         return refused(py, "light field", "is dark: there is nothing to encode");
     }
-    found.into_iter().map(|encoded| Frame::encoded(py, encoded)).collect()
+    found.into_iter().map(|encoded| encoded.map(|encoded| Frame::encoded(py, encoded)).transpose()).collect()
 }
 
 /// The frame that makes a panel send a field, or show an eye a light field.
@@ -111,7 +111,7 @@ fn for_an_eye<'py>(
 ///
 /// :param source: a :class:`Field` or complex array of the panel's shape (complex64 in rows is read where it stands, without a
 ///     copy); a real array: phases [rad], shown as they are; or, for an eye, a :class:`LightField`, :class:`Points` or
-///     :class:`Scene`.
+///     :class:`Scene`. A list of three fields, for three lasers, as :func:`hologram` makes it.
 /// :param panel: the :class:`Panel`.
 /// :param encoding: "double-phase", "kinoform", "gradient", "error-diffusion", "plane-gradient", "gerchberg-saxton", "weighted",
 ///     "double-constraint", "off-axis-bipolar", "off-axis-intensity", "single-side-band", "burckhardt", "lee", "binary-threshold",
@@ -127,13 +127,15 @@ fn for_an_eye<'py>(
 /// :param pupil: for "view": its diameter [m], by default 4 mm, or "all".
 /// :param eye_box: for "view": width and height of the box that the pupil's middle moves in [m].
 /// :param subframes: for "view": so many frames that are shown in turn; then a list is returned.
+/// :param wavelengths: for "view": of three lasers [m], for frames in colour, or "panel", as in :func:`hologram`.
 /// :param seed: seed of what is random.
 /// :param progress: see :func:`hologram`.
-/// :return: :class:`Frame`, with `subframes` a list of them.
+/// :return: :class:`Frame`, with `subframes` a list of them; for three lasers a list of three, for red, green and blue, None for
+///     a laser that has no light.
 #[pyfunction]
 #[pyo3(signature = (
     source, panel, *, encoding = None, iterations = None, depths = None, start = None, reference_angle = None, blaze = None,
-    lens = None, stop = None, eye = None, pupil = None, eye_box = None, subframes = None, seed = 1, progress = None
+    lens = None, stop = None, eye = None, pupil = None, eye_box = None, subframes = None, wavelengths = None, seed = 1, progress = None
 ))]
 #[expect(clippy::too_many_arguments)] // Python's keywords
 pub(crate) fn encode<'py>(
@@ -152,6 +154,7 @@ pub(crate) fn encode<'py>(
     pupil: Option<PupilGiven>,
     eye_box: Option<Lengths>,
     subframes: Option<usize>,
+    wavelengths: Option<Three>,
     seed: u64,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
@@ -164,6 +167,7 @@ pub(crate) fn encode<'py>(
         ("pupil", pupil.is_some()),
         ("eye_box", eye_box.is_some()),
         ("subframes", subframes.is_some()),
+        ("wavelengths", wavelengths.is_some()),
     ];
     let first = |given: &[(&'static str, bool)]| given.iter().find(|(_, given)| *given).map(|(name, _)| *name);
     if let Some(content) = Content::of(source, panel.get(), progress)? {
@@ -178,41 +182,65 @@ pub(crate) fn encode<'py>(
             None => None,
             Some(count) => Some(SubFrames::new(count, Multiplexing::Phases, seed).raise(py)?),
         };
+        let setup = &wavelengths.map_or_else(|| Ok(setup.clone()), |three| three.light(py, setup))?;
+        if setup.lasers.is_some() && subframes.is_some() {
+            return refused(py, "subframes", "are of one laser: leave out wavelengths");
+        }
         let looking = Looking { eye, pupil, eye_box };
         let mut frames = for_an_eye(py, &content, setup, looking, view, sub_frames, progress)?;
-        return match (subframes, frames.pop()) {
-            (None, Some(frame)) => Ok(Bound::new(py, frame)?.into_any()),
-            (_, last) => {
-                frames.extend(last);
-                Ok(PyList::new(py, frames)?.into_any())
-            }
+        if subframes.is_none() && setup.lasers.is_none() {
+            return Ok(frames.pop().flatten().map(|frame| Bound::new(py, frame)).transpose()?.into_pyobject(py)?);
+        }
+        return Ok(PyList::new(py, frames)?.into_any());
+    }
+    let encode_field = |source: &Bound<'py, PyAny>, setup: &Setup| -> PyResult<Frame> {
+        let given = Given::on_panel(source, setup)?;
+        let (field, content, are_phases) = given.get();
+        let usual = if are_phases { Encoding::Kinoform } else { Encoding::usual(setup.profile.modulation()) };
+        let chosen = asked.encoding(py, usual)?;
+        if let Encoding::View(_) = chosen {
+            return refused(
+                py,
+                "encoding",
+                "view shows an eye a scene: give a LightField, Points or Scene, not a field",
+            );
+        }
+        if let Some(name) = first(&for_eyes) {
+            return refused(py, name, format!("{} has no use for it; leave it out", chosen.name()));
+        }
+        if (field.wavelength - setup.wavelength).abs() > 1e-6 * setup.wavelength {
+            let [own, panel] = [field.wavelength, setup.wavelength].map(show_length);
+            return refused(
+                py,
+                "field",
+                format!("is one of {own}, the panel's laser has {panel}: take panel.at(\"{own}\")"),
+            );
+        }
+        let options = EncodeOptions {
+            encoding: Some(chosen),
+            blaze: blaze.map_or([0.0; 2], |(x, y)| [x.0, y.0]),
+            lens: lens.map(|lens| lens.0),
+            stop: stop.map_or(0.0, |stop| stop.0),
         };
-    }
-    let given = Given::on_panel(source, setup)?;
-    let (field, content, are_phases) = given.get();
-    let usual = if are_phases { Encoding::Kinoform } else { Encoding::usual(setup.profile.modulation()) };
-    let chosen = asked.encoding(py, usual)?;
-    if let Encoding::View(_) = chosen {
-        return refused(py, "encoding", "view shows an eye a scene: give a LightField, Points or Scene, not a field");
-    }
-    if let Some(name) = first(&for_eyes) {
-        return refused(py, name, format!("{} has no use for it; leave it out", chosen.name()));
-    }
-    if (field.wavelength - setup.wavelength).abs() > 1e-6 * setup.wavelength {
-        let [own, panel] = [field.wavelength, setup.wavelength].map(show_length);
-        return refused(
-            py,
-            "field",
-            format!("is one of {own}, the panel's laser has {panel}: take panel.at(\"{own}\")"),
-        );
-    }
-    let options = EncodeOptions {
-        encoding: Some(chosen),
-        blaze: blaze.map_or([0.0; 2], |(x, y)| [x.0, y.0]),
-        lens: lens.map(|lens| lens.0),
-        stop: stop.map_or(0.0, |stop| stop.0),
+        let origin = Origin { source: Some("Python".into()), depth: content.depth, ..Origin::default() };
+        let encoded = run(py, progress, |progress| pipeline::frame(field, setup, &options, origin, progress))?;
+        Frame::encoded(py, encoded)
     };
-    let origin = Origin { source: Some("Python".into()), depth: content.depth, ..Origin::default() };
-    let encoded = run(py, progress, |progress| pipeline::frame(field, setup, &options, origin, progress))?;
-    Ok(Bound::new(py, Frame::encoded(py, encoded)?)?.into_any())
+    let Ok(fields) = source.cast::<PyList>() else {
+        return Ok(Bound::new(py, encode_field(source, setup)?)?.into_any());
+    };
+    if !fields.iter().any(|field| field.cast::<Field>().is_ok()) {
+        // Rows of numbers.
+        return Ok(Bound::new(py, encode_field(source, setup)?)?.into_any());
+    }
+    let one = |given: Bound<'py, PyAny>| match given.cast::<Field>() {
+        Ok(field) => {
+            let wavelength = field.get().samples.wavelength;
+            encode_field(&given, &Setup { wavelength, ..setup.clone() }).map(Some)
+        }
+        Err(_) if given.is_none() => Ok(None),
+        Err(_) => refused(py, "field", "a list of fields holds Fields, and None for a laser without light"),
+    };
+    let frames = fields.iter().map(one).collect::<PyResult<Vec<_>>>()?;
+    Ok(PyList::new(py, frames)?.into_any())
 }

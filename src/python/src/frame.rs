@@ -28,6 +28,11 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
+    /// Without a report.
+    pub(crate) fn of(frame: holodrive::panel::Frame) -> Self {
+        Self { frame, report: None }
+    }
+
     /// Of an encoding.
     pub(crate) fn encoded(py: Python<'_>, encoded: Encoded) -> PyResult<Self> {
         let EncodeReport {

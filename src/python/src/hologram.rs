@@ -4,14 +4,14 @@ use crate::errors::refused;
 use crate::field::Field;
 use crate::panel::Panel;
 use crate::points::Points;
-use crate::quantities::{Memory, named};
+use crate::quantities::{Memory, Three, named};
 use crate::run::run;
-use holodrive::hologram::{HologramReport, HologramSettings};
+use holodrive::hologram::{Computed, HologramReport, HologramSettings};
 use holodrive::names::Named;
 use holodrive::pipeline;
 use holodrive::points::Exposure;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyList};
 
 /// The field of points on a panel, by the engine that keeps the error in the least time.
 ///
@@ -26,14 +26,16 @@ use pyo3::types::PyDict;
 /// :param error: wanted relative L2 error of the field.
 /// :param engine: "direct", "tiles", "planes", "gpu", "gpu-planes", "oracle" or "recurrence"; by default the fastest that serves.
 /// :param channel: "luminance", "red", "green" or "blue" of a coloured cloud.
+/// :param wavelengths: of three lasers [m], for light in colour, in any order, or "panel": those that the profile names.
 /// :param memory: what may be taken beside points and field [bytes], or text such as "2GB".
 /// :param progress: ``callable(step, done, total)``, a tqdm bar, or True for a bar of tqdm's. An exception that it raises stops the
 ///     work and is raised here, as Ctrl-C is.
-/// :return: :class:`Field`, complex64 on the panel's pixels.
+/// :return: :class:`Field`, complex64 on the panel's pixels; with `wavelengths` a list of three, for red, green and blue, None
+///     for a laser that has no light.
 /// :raises ParameterError: a setting is out of its domain, or the points are all dark.
 #[pyfunction]
 #[pyo3(signature = (
-    points, panel, *, error = 1e-3, engine = None, channel = "luminance", memory = None, progress = None
+    points, panel, *, error = 1e-3, engine = None, channel = "luminance", wavelengths = None, memory = None, progress = None
 ))]
 #[expect(clippy::too_many_arguments)] // Python's keywords
 pub(crate) fn hologram(
@@ -43,9 +45,10 @@ pub(crate) fn hologram(
     error: f64,
     engine: Option<&str>,
     channel: &str,
+    wavelengths: Option<Three>,
     memory: Option<Memory>,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Field> {
+) -> PyResult<Py<PyAny>> {
     let usual = HologramSettings::default();
     let settings = HologramSettings {
         error,
@@ -54,18 +57,27 @@ pub(crate) fn hologram(
         ..usual
     };
     let (points, setup) = (points.get(), &panel.get().setup);
-    let cloud = points.cloud();
-    let channel = named(py, channel)?;
+    let setup = &wavelengths.map_or_else(|| Ok(setup.clone()), |three| three.light(py, setup))?;
+    let (cloud, content) = (points.cloud(), points.content());
+    let exposures = match &setup.lasers {
+        None => Exposure::whole(named(py, channel)?, setup.wavelength),
+        Some(_) if channel != "luminance" => return refused(py, "channel", "is for one laser; three show all colours"),
+        Some(lasers) => Exposure::of_lasers(lasers, None),
+    };
     let computed = run(py, progress, |progress| {
-        // One laser has one exposure.
-        let exposures = Exposure::whole(channel, setup.wavelength);
-        exposures.iter().find_map(|one| pipeline::field(cloud, one, setup, &settings, progress).transpose()).transpose()
+        let field = |one| pipeline::field(cloud, one, setup, &settings, progress);
+        exposures.iter().map(field).collect::<holodrive::Result<Vec<_>>>()
     })?;
-    match computed {
-        Some(computed) => {
-            let report = report(py, &computed.report)?;
-            Ok(Field::made(computed.field, points.content(), Some(report)))
-        }
+    let made = |computed: Computed| {
+        let report = report(py, &computed.report)?;
+        Ok::<_, PyErr>(Field::made(computed.field, content, Some(report)))
+    };
+    let mut fields = computed.into_iter().map(|one| one.map(made).transpose()).collect::<PyResult<Vec<_>>>()?;
+    if setup.lasers.is_some() {
+        return Ok(PyList::new(py, fields)?.into_any().unbind());
+    }
+    match fields.pop().flatten() {
+        Some(field) => Ok(Bound::new(py, field)?.into_any().unbind()),
         None => refused(py, "points", "have no light for this laser"),
     }
 }

@@ -6,6 +6,7 @@
 //! it, stands in the package's own files (`holodrive/*.py`).
 
 mod arrays;
+mod camera;
 mod encode;
 mod errors;
 mod field;
@@ -43,11 +44,14 @@ fn _holodrive(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<light_field::LightField>()?;
     module.add_class::<picture::Picture>()?;
     module.add_function(wrap_pyfunction!(program, module)?)?;
+    module.add_function(wrap_pyfunction!(run::_worked, module)?)?;
     module.add_function(wrap_pyfunction!(panel::panels, module)?)?;
     module.add_function(wrap_pyfunction!(hologram::hologram, module)?)?;
     module.add_function(wrap_pyfunction!(field::propagate, module)?)?;
     module.add_function(wrap_pyfunction!(light_field::light_field, module)?)?;
     module.add_function(wrap_pyfunction!(encode::encode, module)?)?;
+    module.add_function(wrap_pyfunction!(camera::calibrate_camera, module)?)?;
+    module.add_function(wrap_pyfunction!(camera::encode_in_the_loop, module)?)?;
     module.add_function(wrap_pyfunction!(seen::reconstruct, module)?)?;
     module.add_function(wrap_pyfunction!(seen::judge, module)?)?;
     module.add_function(wrap_pyfunction!(metrics::metrics, module)?)?;

@@ -1,8 +1,9 @@
 //! Lengths and angles as Python gives them: numbers in SI units, or text with a unit.
 
-use crate::errors::Raise;
+use crate::errors::{Raise, refused};
 use glam::{DVec2, DVec3};
 use holodrive::names::Named;
+use holodrive::panel::Setup;
 use holodrive::units;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
@@ -79,6 +80,27 @@ impl<'py> FromPyObject<'_, 'py> for Place {
     fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
         let (Length(x), Length(y), Length(z)) = value.extract()?;
         Ok(Self(DVec3::new(x, y, z)))
+    }
+}
+
+/// Wavelengths of three lasers [m], or "panel": those that its profile names.
+#[derive(FromPyObject)]
+pub(crate) enum Three {
+    Given(Length, Length, Length),
+    Of(String),
+}
+
+impl Three {
+    /// The panel in the light of these.
+    pub(crate) fn light(&self, py: Python<'_>, setup: &Setup) -> PyResult<Setup> {
+        let given = match self {
+            Self::Given(one, two, three) => Some([one.0, two.0, three.0]),
+            Self::Of(panel) if panel == "panel" => None,
+            Self::Of(other) => {
+                return refused(py, "wavelengths", format!("`{other}` is no three lengths, nor \"panel\""));
+            }
+        };
+        setup.clone().in_color(given).raise(py)
     }
 }
 

@@ -4,8 +4,18 @@ use crate::errors::raised;
 use holodrive::Result;
 use holodrive::progress::Progress;
 use pyo3::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// Time that the library has worked for calls [ns].
+static WORKED: AtomicU64 = AtomicU64::new(0);
+
+/// Seconds that the library has worked for calls of this process: what a call takes beyond is the package's own.
+#[pyfunction]
+pub(crate) fn _worked() -> f64 {
+    1e-9 * WORKED.load(Ordering::Relaxed) as f64
+}
 
 /// How often signals are looked for and progress is told: an eye takes it for at once.
 const LOOK: Duration = Duration::from_millis(25);
@@ -44,7 +54,10 @@ pub(crate) fn run<T: Send>(
             let (alive, end) = channel::<()>();
             let worker = scope.spawn(move || {
                 let _alive = alive;
-                work(progress)
+                let begin = Instant::now();
+                let outcome = work(progress);
+                WORKED.fetch_add(begin.elapsed().as_nanos() as u64, Ordering::Relaxed);
+                outcome
             });
             let mut raised = None;
             while end.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {

@@ -11,8 +11,9 @@ use holodrive::points::budget::Budget;
 use holodrive::points::placement::Phase;
 use holodrive::points::{LitScene, Placement, SceneSettings, TraceSettings, WhitePoint};
 use holodrive::scene::environment::Panorama;
-use holodrive::scene::gltf::{Choice, Clip, LoadOptions};
+use holodrive::scene::gltf::{Choice, Clip, File, LoadOptions};
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -54,6 +55,39 @@ pub(crate) enum Count {
 pub(crate) enum White {
     At(f32),
     By(String),
+}
+
+/// What scenes are read and lit with.
+struct Asked {
+    camera: Option<Which>,
+    animation: Option<Which>,
+    time: f64,
+    environment: Option<PathBuf>,
+    viewer_light: bool,
+    bounces: u32,
+    photons: Option<u32>,
+    seed: u64,
+}
+
+impl Asked {
+    fn settings(self) -> SceneSettings {
+        let Self { camera, animation, time, environment, viewer_light, bounces, photons, seed } = self;
+        let usual = IlluminationSettings::default();
+        SceneSettings {
+            load: LoadOptions {
+                camera: camera.map(Choice::from),
+                clip: animation.map_or(Clip::First, |clip| Clip::Of(clip.into())),
+                time,
+                viewer_light,
+                environment: environment.map(|path| Panorama { path, strength: 1.0, turn: 0.0 }),
+                ..LoadOptions::default()
+            },
+            illumination: IlluminationSettings { bounces, photons: photons.unwrap_or(usual.photons), seed, ..usual },
+            trace: TraceSettings { bounces, seed, ..TraceSettings::default() },
+            phase: Phase::Random { seed },
+            ..SceneSettings::default()
+        }
+    }
 }
 
 impl Scene {
@@ -112,22 +146,58 @@ impl Scene {
         seed: u64,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let usual = IlluminationSettings::default();
-        let settings = SceneSettings {
-            load: LoadOptions {
-                camera: camera.map(Choice::from),
-                clip: animation.map_or(Clip::First, |clip| Clip::Of(clip.into())),
-                time,
-                viewer_light,
-                environment: environment.map(|path| Panorama { path, strength: 1.0, turn: 0.0 }),
-                ..LoadOptions::default()
-            },
-            illumination: IlluminationSettings { bounces, photons: photons.unwrap_or(usual.photons), seed, ..usual },
-            trace: TraceSettings { bounces, seed, ..TraceSettings::default() },
-            phase: Phase::Random { seed },
-            ..SceneSettings::default()
-        };
+        let asked = Asked { camera, animation, time, environment, viewer_light, bounces, photons, seed };
+        let settings = asked.settings();
         let lit = run(py, progress, |progress| pipeline::scene(&path, &settings, progress))?;
+        Ok(Self { lit: Arc::new(lit), path, settings })
+    }
+
+    /// Reads a scene from the bytes of a .glb or .gltf that holds all it needs, and lights it.
+    ///
+    /// >>> import holodrive
+    /// >>> holodrive.Scene.from_bytes(b"glTF")
+    /// Traceback (most recent call last):
+    ///     ...
+    /// holodrive._errors.InputError: bytes: ...
+    ///
+    /// :param data: the file's bytes: buffers and pictures in the binary chunk of a .glb, or in data URIs.
+    /// :param name: stands in errors and in what is made of it.
+    /// :param camera: as in :meth:`load`, like all that follow.
+    /// :param animation: name or number of the clip that poses it.
+    /// :param time: time in the clip [s].
+    /// :param environment: panorama (.hdr, .exr, picture) that lights it from all around.
+    /// :param viewer_light: adds the light of an unlit file to the file's own.
+    /// :param bounces: most mirrors or glass surfaces on one path.
+    /// :param photons: photons by way of curved mirrors and glass.
+    /// :param seed: seed of all sampling.
+    /// :param progress: see :func:`hologram`.
+    #[staticmethod]
+    #[pyo3(signature = (
+        data, *, name = "bytes", camera = None, animation = None, time = 0.0, environment = None, viewer_light = false,
+        bounces = 32, photons = None, seed = 1, progress = None
+    ))]
+    #[expect(clippy::too_many_arguments)] // Python's keywords
+    fn from_bytes(
+        py: Python<'_>,
+        data: PyBackedBytes,
+        name: &str,
+        camera: Option<Which>,
+        animation: Option<Which>,
+        time: f64,
+        environment: Option<PathBuf>,
+        viewer_light: bool,
+        bounces: u32,
+        photons: Option<u32>,
+        seed: u64,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let asked = Asked { camera, animation, time, environment, viewer_light, bounces, photons, seed };
+        let (settings, path) = (asked.settings(), PathBuf::from(name));
+        let lit = run(py, progress, |progress| {
+            progress.start("scene", 0);
+            let loaded = File::of_bytes(&path, &data)?.pose(&settings.load)?;
+            LitScene::new(&path, loaded, settings.illumination, progress)
+        })?;
         Ok(Self { lit: Arc::new(lit), path, settings })
     }
 

@@ -50,6 +50,8 @@ pub(super) struct Document {
     pub(super) root: json::Root,
     /// Whether URIs may point outside of the file's folder.
     pub(super) allow_outside: bool,
+    /// Whether it came as bytes, without a folder.
+    pub(super) is_alone: bool,
     /// Whether it came with the library.
     pub(super) is_embedded: bool,
     /// Content of each buffer, at least as long as the file says.
@@ -69,8 +71,19 @@ impl Document {
                     .map_err(|why| Error::input(path, embedded::not_embedded(path).unwrap_or(why)))?,
             ),
         };
-        let source = Source { scene: path, allow_outside };
-        let told = converted::convert(source, &bytes, warnings).map_err(|why| Error::input(path, why))?;
+        let source = Source { scene: path, allow_outside, is_alone: false };
+        Self::of_bytes(source, &bytes, own.is_some(), warnings)
+    }
+
+    /// Of a file's bytes, with what lies beside it as the source says.
+    pub(super) fn of_bytes(
+        source: Source,
+        bytes: &[u8],
+        is_embedded: bool,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<Self> {
+        let Source { scene: path, allow_outside, is_alone } = source;
+        let told = converted::convert(source, bytes, warnings).map_err(|why| Error::input(path, why))?;
         let mut beside = Vec::new();
         let (mut root, mut chunk) = match told {
             Some(told) => {
@@ -79,8 +92,7 @@ impl Document {
                 (root, Some(Cow::Owned(told.buffer)))
             }
             None => {
-                let (text, chunk) =
-                    if bytes.starts_with(b"glTF") { split_glb(path, &bytes)? } else { (&bytes[..], None) };
+                let (text, chunk) = if bytes.starts_with(b"glTF") { split_glb(path, bytes)? } else { (bytes, None) };
                 (parse(path, text, warnings)?, chunk.map(Cow::Borrowed))
             }
         };
@@ -109,7 +121,7 @@ impl Document {
             buffers.push(content);
         }
         packed::unpack(path, &mut root, &mut buffers)?;
-        Ok(Self { path: path.to_path_buf(), root, allow_outside, is_embedded: own.is_some(), buffers, beside })
+        Ok(Self { path: path.to_path_buf(), root, allow_outside, is_alone, is_embedded, buffers, beside })
     }
 
     /// An [`Error::Input`] for this file.
@@ -119,7 +131,7 @@ impl Document {
 
     /// From where its URIs are read.
     pub(super) fn source(&self) -> Source<'_> {
-        Source { scene: &self.path, allow_outside: self.allow_outside }
+        Source { scene: &self.path, allow_outside: self.allow_outside, is_alone: self.is_alone }
     }
 
     /// What a node is called in messages.

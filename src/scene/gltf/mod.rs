@@ -191,6 +191,19 @@ impl File {
         Ok(Self { document, warnings, decoded: None, lit: None, around: None, own_around: None })
     }
 
+    /// A glTF or GLB file from its bytes, which hold all that it needs: buffers and images in the binary chunk or in data URIs.
+    /// `name` stands in errors.
+    ///
+    /// # Errors
+    ///
+    /// As [`File::open`]; [`Error::Input`] for a URI that names a file.
+    pub fn of_bytes(name: &Path, bytes: &[u8]) -> Result<Self> {
+        let mut warnings = Vec::new();
+        let source = resources::Source { scene: name, allow_outside: false, is_alone: true };
+        let document = Document::of_bytes(source, bytes, true, &mut warnings)?;
+        Ok(Self { document, warnings, decoded: None, lit: None, around: None, own_around: None })
+    }
+
     /// The scene in the pose that `options` name.
     ///
     /// # Errors

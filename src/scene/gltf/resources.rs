@@ -45,12 +45,19 @@ pub(super) struct Source<'a> {
     pub(super) scene: &'a Path,
     /// Whether files beside and above its folder are read, too.
     pub(super) allow_outside: bool,
+    /// Whether it came as bytes, which lie beside nothing.
+    pub(super) is_alone: bool,
 }
 
 /// What `uri` of a scene points to.
 pub(super) fn read_uri(source: Source, uri: &str, limit: u64) -> Result<Vec<u8>, String> {
     if let Some(data) = uri.strip_prefix("data:") {
         return decode_data_uri(data);
+    }
+    if source.is_alone {
+        return Err(format!(
+            "'{uri}' is a file beside it, and these are bytes without a folder; pack all into one .glb"
+        ));
     }
     if let Some(own) = embedded::beside(source.scene, uri) {
         return Ok(own.to_vec());
@@ -157,7 +164,7 @@ mod tests {
 
     #[test]
     fn only_files_beside_the_scene_are_read() {
-        let source = Source { scene: Path::new("scene.gltf"), allow_outside: true };
+        let source = Source { scene: Path::new("scene.gltf"), allow_outside: true, is_alone: false };
         for uri in [
             "http://example.org/a.bin",
             "file:///etc/hostname",
@@ -181,7 +188,9 @@ mod tests {
         std::os::unix::fs::symlink("../secret.bin", inner.join("link.bin")).expect("link");
         let pipe = std::process::Command::new("mkfifo").arg(inner.join("pipe.bin")).status();
         let scene = inner.join("scene.gltf");
-        let read = |uri: &str, allow_outside: bool| read_uri(Source { scene: &scene, allow_outside }, uri, 100);
+        let read = |uri: &str, allow_outside: bool| {
+            read_uri(Source { scene: &scene, allow_outside, is_alone: false }, uri, 100)
+        };
         assert_eq!(read("maps/own.bin", false).as_deref(), Ok(&b"own"[..]));
         assert_eq!(read("./maps/own.bin", false).as_deref(), Ok(&b"own"[..]));
         for uri in ["../secret.bin", "maps/../../secret.bin", "%2e%2e/secret.bin", "link.bin"] {
@@ -203,7 +212,7 @@ mod tests {
         let path = folder.path().join("a b.bin");
         std::fs::write(&path, [7; 11]).expect("write");
         let scene = folder.path().join("scene.gltf");
-        let source = Source { scene: &scene, allow_outside: false };
+        let source = Source { scene: &scene, allow_outside: false, is_alone: false };
         assert!(read_uri(source, "a%20b.bin", 10).is_err());
         assert_eq!(read_uri(source, "a%20b.bin", 11), Ok(vec![7; 11]));
     }
