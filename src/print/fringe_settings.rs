@@ -11,6 +11,9 @@ pub enum Binarisation {
     Threshold,
     /// Open where the phase of u·r* is within ±arcsin(|u|/A): the first order's amplitude follows |u| (Lee 1979).
     PulseWidth,
+    /// Begun as `threshold`; then pixels are turned over while that lowers the rounding noise which an eye box receives
+    /// ([`crate::encode`]'s search within a band): what lies elsewhere takes it.
+    DirectSearch,
     /// Floyd–Steinberg error diffusion, begun in a halo outside of each tile.
     #[default]
     Diffusion,

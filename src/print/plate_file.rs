@@ -8,7 +8,7 @@ use super::transfer::TransferFile;
 use crate::config::ConfigFile;
 use crate::error::{Error, Result};
 use crate::points::colour::Lasers;
-use crate::segments::{Slit, Viewing};
+use crate::segments::{PointPhase, Slit, Viewing};
 use crate::units;
 use serde::Deserialize;
 use std::path::Path;
@@ -54,6 +54,13 @@ struct PlateFile {
     scene: SceneFile,
 }
 
+/// Sides of the eye box where none is given, as shares of the viewer's distance.
+const EYE_BOX: [f64; 2] = [0.2, 0.1];
+
+/// Contrast of a direct search where none is given: that of the threshold from which it begins. In 8 bits the same fringe
+/// would be clipped; in one bit more light reaches the eye, and the noise outside of its box grows instead.
+const SEARCHED: f64 = 3.0;
+
 fn one() -> u64 {
     1
 }
@@ -76,6 +83,9 @@ struct SceneFile {
     resolution: Option<String>,
     rays: Option<u32>,
     object_angle: Option<[String; 2]>,
+    #[serde(default)]
+    phase: PointPhase,
+    eye_box: Option<[String; 2]>,
 }
 
 #[derive(Deserialize)]
@@ -220,6 +230,15 @@ impl Plate {
         if scene.scale.is_some_and(|scale| !(scale.is_finite() && scale > 0.0)) {
             return at.refuse("scene.scale must be greater than zero");
         }
+        let searched = file.bits == 1 && binarisation == Binarisation::DirectSearch;
+        let eye_box = match &scene.eye_box {
+            Some(sides) => {
+                let side = |text: &String| at.read("scene.eye_box", text, units::positive_length);
+                Some([side(&sides[0])?, side(&sides[1])?])
+            }
+            // Both eyes, and room to move the head by as much.
+            None => searched.then(|| EYE_BOX.map(|share| share * viewer)),
+        };
         let plate = Self {
             name: file.name,
             raster,
@@ -230,7 +249,11 @@ impl Plate {
                 bits: file.bits,
                 binarisation,
                 bias: at.within("bias", file.bias.unwrap_or(0.5), 0.0..=1.0)?,
-                contrast: at.within("contrast", file.contrast.unwrap_or(1.0), 1e-3..=1e3)?,
+                contrast: at.within(
+                    "contrast",
+                    file.contrast.unwrap_or(if searched { SEARCHED } else { 1.0 }),
+                    1e-3..=1e3,
+                )?,
                 percentile: at.within("percentile", file.percentile.unwrap_or(0.999), 0.5..=1.0)?,
                 reference_ratio: at.within("reference_ratio", file.reference_ratio.unwrap_or(1.0), 1e-3..=1e3)?,
                 polarity: file.polarity,
@@ -247,8 +270,10 @@ impl Plate {
                 },
                 place: -at.read("scene.distance", &scene.distance, units::length)?,
                 scale: scene.scale,
+                phase: scene.phase,
             },
             object_angle,
+            eye_box,
             error: at.within("error", file.error.unwrap_or(if file.bits == 1 { 1e-2 } else { 5e-3 }), 1e-4..=0.1)?,
             seed: file.seed,
             printer: file.printer.as_ref().map(|printer| printer.read(at)).transpose()?,

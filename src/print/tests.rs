@@ -251,6 +251,7 @@ fn previews_show_points_where_they_are_from_every_eye_and_file() {
                     size: Some((192, 144)),
                     part: None,
                     wavelength: None,
+                    lamp: None,
                     memory: 1 << 30,
                 };
                 let seen = preview(&path, &settings, &Progress::new()).expect("preview");
@@ -270,6 +271,7 @@ fn previews_show_points_where_they_are_from_every_eye_and_file() {
             size: Some((8, 8)),
             part: Some([0, 0, 769, 4]),
             wavelength: None,
+            lamp: None,
             memory: 1 << 30,
         };
         assert!(preview(&path, &wrong, &Progress::new()).unwrap_err().to_string().contains("not on the plate"));
