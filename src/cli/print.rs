@@ -43,7 +43,10 @@ fn resolved(args: &PrintArgs) -> Result<PrintSettings> {
     };
     let light = &args.light;
     Ok(PrintSettings {
-        plate: Plate::find(path, &Asked { size: args.size, pitch: args.pitch })?,
+        plate: Plate::find(
+            path,
+            &Asked { size: args.size, pitch: args.pitch, binarisation: args.binarisation, phase: args.phase },
+        )?,
         input,
         options: scene_options(&light.file, light.bounces, light.photons, light.white)?,
         folder,

@@ -172,3 +172,74 @@ struct Changed {
     around: [[usize; 2]; 2],
     error: Vec<Complex32>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::Complex64;
+    use crate::random::Random;
+
+    /// Wishes and a carrier of a third of a turn a pixel.
+    fn case(width: usize, height: usize) -> (Vec<f32>, Vec<Complex32>) {
+        let mut random = Random::new(5, 1);
+        let wishes = (0..width * height).map(|_| 0.2 + 0.6 * random.uniform_f32()).collect();
+        let unit = (0..width * height).map(|i| Complex32::from_polar(1.0, 2.1 * (i % width) as f32)).collect();
+        (wishes, unit)
+    }
+
+    /// E by the double sum, in f64.
+    fn noise(kernel: &BandKernel, open: &[f32], wishes: &[f32], unit: &[Complex32], width: usize) -> f64 {
+        let d = |i: usize| {
+            let s = Complex64::new(f64::from(unit[i].re), f64::from(unit[i].im));
+            s * f64::from(open[i] - wishes[i])
+        };
+        let tap = |axis: usize, a: usize, b: usize| {
+            let lag = a.abs_diff(b);
+            let taps = &kernel.taps[axis];
+            taps.get(taps.len() / 2 + lag).map_or(0.0, |&h| f64::from(h))
+        };
+        let pair = |i: usize, j: usize| tap(0, i % width, j % width) * tap(1, i / width, j / width);
+        (0..open.len())
+            .flat_map(|i| (0..open.len()).map(move |j| (i, j)))
+            .filter(|&(i, j)| pair(i, j) != 0.0)
+            .map(|(i, j)| pair(i, j) * (d(i).conj() * d(j)).re)
+            .sum()
+    }
+
+    #[test]
+    fn a_search_ends_where_no_pixel_lowers_the_noise() {
+        let (width, height) = (40, 24);
+        let (wishes, unit) = case(width, height);
+        let kernel = BandKernel::new([0.15, 0.2]);
+        let begun = kernel.search(&wishes, &unit, width, [100, -7], 0);
+        assert!(begun.iter().zip(&wishes).all(|(q, t)| (*q == 1.0) == (*t > 0.5)));
+        let mut open = kernel.search(&wishes, &unit, width, [100, -7], 60);
+        let least = noise(&kernel, &open, &wishes, &unit, width);
+        let first = noise(&kernel, &begun, &wishes, &unit, width);
+        assert!(least < 0.3 * first, "{least} of {first}");
+        for at in (0..open.len()).step_by(37) {
+            open[at] = 1.0 - open[at];
+            let turned = noise(&kernel, &open, &wishes, &unit, width);
+            assert!(turned > least - 1e-3, "pixel {at}: {turned} below {least}");
+            open[at] = 1.0 - open[at];
+        }
+    }
+
+    #[test]
+    fn kernels_are_even_and_their_spectra_positive_and_within_the_band() {
+        for half in [0.05, 0.16, 0.3] {
+            let taps = taps(half);
+            let middle = (taps.len() / 2) as i64;
+            assert!(taps.len() / 2 <= REACH && (taps[middle as usize] - 1.0).abs() < 1e-6);
+            assert!(taps.iter().eq(taps.iter().rev()));
+            let spectrum = |f: f64| -> f64 {
+                taps.iter().zip(-middle..).map(|(&h, x)| f64::from(h) * (2.0 * PI * f * x as f64).cos()).sum()
+            };
+            assert!((0..=100).all(|i| spectrum(0.005 * f64::from(i)) > -1e-4));
+            assert!(
+                spectrum(0.4 * half) > 0.8 * spectrum(0.0) && spectrum(2.0 * half) < 0.02 * spectrum(0.0),
+                "{half}"
+            );
+        }
+    }
+}

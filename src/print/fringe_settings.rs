@@ -1,6 +1,7 @@
 //! How object and reference become levels.
 
 use crate::encode::Quantity;
+use crate::names::{Name, Named};
 use serde::{Deserialize, Serialize};
 
 /// How a fringe becomes one bit.
@@ -17,6 +18,16 @@ pub enum Binarisation {
     /// Floyd–Steinberg error diffusion, begun in a halo outside of each tile.
     #[default]
     Diffusion,
+}
+
+impl Named for Binarisation {
+    const KIND: &'static str = "binarisation";
+    const NAMES: &'static [Name<Self>] = &[
+        ("threshold", || Self::Threshold, "open where the fringe is above its middle"),
+        ("pulse-width", || Self::PulseWidth, "pulses as wide as the light is strong"),
+        ("direct-search", || Self::DirectSearch, "pixels turned over until an eye box is free of noise"),
+        ("diffusion", || Self::Diffusion, "error diffusion"),
+    ];
 }
 
 /// Which level is clear.

@@ -5,10 +5,11 @@
 //! the plate and averages speckle out: with none of it a plate of matte surfaces is seen in full speckle.
 
 use crate::error::{Error, Result};
+use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 
 /// A round lamp with a spectrum.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Lamp {
     /// Diameter [m]; 0 for a point.
     pub diameter: f64,

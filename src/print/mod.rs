@@ -40,6 +40,8 @@ mod printer;
 mod reader;
 mod reference;
 mod registration;
+#[cfg(test)]
+mod search_tests;
 mod shard;
 #[cfg(test)]
 mod tests;

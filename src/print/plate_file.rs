@@ -142,10 +142,10 @@ impl Plate {
         let [width, height] = asked.size.unwrap_or(size).pixels([pitch_x, pitch_y]);
         let raster = Raster { width, height, pitch_x, pitch_y };
         step.map_or(Ok(()), |step| check_step(&raster, step)).or_else(|what| at.refuse(what))?;
-        if file.bits == 8 && file.binarisation.is_some() {
+        if file.bits == 8 && file.binarisation.or(asked.binarisation).is_some() {
             return at.refuse("binarisation is for bits = 1; leave it out");
         }
-        let binarisation = file.binarisation.unwrap_or_default();
+        let binarisation = asked.binarisation.or(file.binarisation).unwrap_or_default();
         if file.bits == 1 && file.quantity != Quantity::Bipolar && binarisation == Binarisation::PulseWidth {
             return at.refuse("pulse-width makes its fringe from u·r* itself; take quantity = \"bipolar\"");
         }
@@ -270,7 +270,7 @@ impl Plate {
                 },
                 place: -at.read("scene.distance", &scene.distance, units::length)?,
                 scale: scene.scale,
-                phase: scene.phase,
+                phase: asked.phase.unwrap_or(scene.phase),
             },
             object_angle,
             eye_box,
@@ -310,7 +310,7 @@ mod tests {
             assert_eq!((same.raster.width, same.raster.height), (640, 384), "{to}");
             assert!((same.raster.pitch_x - 1e-6).abs() < 1e-20, "{to}");
         }
-        let asked = Asked { size: Some(PlateSize::Lengths([0.2e-3, 0.1e-3])), pitch: Some(0.5e-6) };
+        let asked = Asked { size: Some(PlateSize::Lengths([0.2e-3, 0.1e-3])), pitch: Some(0.5e-6), ..Asked::default() };
         let asked = Plate::parse_as(SMALL, Path::new("t.toml"), &asked).expect("plate");
         assert_eq!((asked.raster.width, asked.raster.height, asked.file.tile, asked.segment), (400, 200, 128, 128));
         let oblong = SMALL.replace("pitch = \"1um\"", "pitch_x = \"1um\"\npitch_y = \"0.5um\"");

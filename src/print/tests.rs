@@ -29,7 +29,7 @@ pub(super) fn point(x: f64, y: f64, z: f64) -> PointSource {
     PointSource { position: DVec3::new(x, y, z), amplitude: 1e-3, phase: 0.7 }
 }
 
-fn cloud(count: u64) -> Vec<PointSource> {
+pub(super) fn cloud(count: u64) -> Vec<PointSource> {
     let at = |i: u64| {
         let mut random = Random::new(5, i);
         let mut side = |half: f64| (2.0 * random.uniform() - 1.0) * half;

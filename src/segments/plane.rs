@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::field::Grid;
+use crate::names::{Name, Named};
 use crate::points::budget::EYE_ANGLE;
 use serde::{Deserialize, Serialize};
 
@@ -145,6 +146,14 @@ pub enum PointPhase {
     /// the light comes in spots, λ over the angle of the lattice apart: less than a pupil, where the eye separates as
     /// much as a pupil diffracts.
     Path,
+}
+
+impl Named for PointPhase {
+    const KIND: &'static str = "phase";
+    const NAMES: &'static [Name<Self>] = &[
+        ("random", || Self::Random, "as from a matte surface"),
+        ("path", || Self::Path, "all waves reach the eye in step"),
+    ];
 }
 
 impl PointPhase {

@@ -2,8 +2,9 @@
 
 use super::parse::{White, lamp, one_of, part, position, size, white};
 use super::scene::FileArgs;
-use crate::print::PlateSize;
 use crate::print::export::Format;
+use crate::print::{Binarisation, PlateSize};
+use crate::segments::PointPhase;
 use crate::units;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -25,6 +26,12 @@ pub(crate) struct PrintArgs {
     /// Distance of its pixels in place of its own, or dots per inch.
     #[arg(long, value_parser = units::pitch, value_name = "0.5um|5080dpi")]
     pub(crate) pitch: Option<f64>,
+    /// How one bit is made in place of the plate's own way.
+    #[arg(long, value_parser = one_of::<Binarisation>(), value_name = "WAY")]
+    pub(crate) binarisation: Option<Binarisation>,
+    /// Where the points of a scene stand, and in which phases, in place of the plate's own.
+    #[arg(long, value_parser = one_of::<PointPhase>(), value_name = "PHASE")]
+    pub(crate) phase: Option<PointPhase>,
     /// Folder for the plate. One that was begun with the same settings is gone on with; one of others is refused.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
