@@ -140,6 +140,53 @@ fn threads_shards_and_their_order_make_the_same_bytes() {
 }
 
 #[test]
+fn searched_plates_are_the_same_in_parts_and_after_a_kill() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    prepare(f);
+    let way = ["--binarisation", "direct-search"];
+    let whole = done(f, &print_into("whole", &way));
+    assert!(whole["complete"] == true, "{whole}");
+    let expected = contents(&f.join("whole"));
+    done(f, &print_into("parts", &[&way[..], &["--shard", "1/2"]].concat()));
+    done(f, &print_into("parts", &[&way[..], &["--shard", "0/2"]].concat()));
+    assert!(contents(&f.join("parts")) == expected, "two parts");
+    let mut run = Command::new(env!("CARGO_BIN_EXE_holodrive"))
+        .args(print_into("killed", &way))
+        .env("RAYON_NUM_THREADS", "1")
+        .current_dir(f)
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("starts");
+    let begin = Instant::now();
+    // Not before its first tile.
+    while !f.join("killed/.tiles").exists() && begin.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    run.kill().expect("kills");
+    run.wait().expect("ends");
+    done(f, &print_into("killed", &way));
+    assert!(contents(&f.join("killed")) == expected, "killed");
+    refused(
+        f,
+        &["print", "points.ply", "--plate", "gray.toml", "--binarisation", "direct-search", "-o", "x"],
+        "bits = 1",
+    );
+    refused(f, &print_into("whole", &[]), "binarisation");
+    // A lamp as wide as in life: the picture is another one than a laser's, and its report says so.
+    let look = ["print", "preview", "whole", "--eye", "0mm,0mm,30mm", "--focus", "-5mm", "--size", "40x30"];
+    let laser = done(f, &[&look[..], &["-o", "laser.png"]].concat());
+    let lamp = done(
+        f,
+        &[&look[..], &["--lamp", "3mm,300mm", "--bandwidth", "10nm", "--places", "9", "-o", "lamp.png"]].concat(),
+    );
+    assert!(lamp["lamp"]["diameter"] == 3e-3 && laser.get("lamp").is_none(), "{lamp}");
+    assert!(fs::read(f.join("laser.png")).expect("laser") != fs::read(f.join("lamp.png")).expect("lamp"));
+    refused(f, &[&look[..], &["--lamp", "3mm"]].concat(), "2mm,300mm");
+    refused(f, &[&look[..], &["--lamp", "3m,300mm"]].concat(), "farther than wide");
+}
+
+#[test]
 fn a_run_killed_twenty_times_ends_in_the_same_bytes() {
     let folder = tempfile::tempdir().expect("folder");
     let f = folder.path();

@@ -5,7 +5,7 @@ use super::bar::Bar;
 use super::report::{Report, count, seconds};
 use crate::print::export::{Frames, export};
 use crate::print::preview::PreviewSettings;
-use crate::print::{Asked, Manifest, Plan, Plate, PlateJob, PlateView, PrintSettings, Shard, folder};
+use crate::print::{Asked, Lamp, Manifest, Plan, Plate, PlateJob, PlateView, PrintSettings, Shard, folder};
 use crate::segments::SceneOptions;
 use crate::units::show_length;
 use crate::{Error, Result};
@@ -43,7 +43,10 @@ fn resolved(args: &PrintArgs) -> Result<PrintSettings> {
     };
     let light = &args.light;
     Ok(PrintSettings {
-        plate: Plate::find(path, &Asked { size: args.size, pitch: args.pitch })?,
+        plate: Plate::find(
+            path,
+            &Asked { size: args.size, pitch: args.pitch, binarisation: args.binarisation, phase: args.phase },
+        )?,
         input,
         options: scene_options(&light.file, light.bounces, light.photons, light.white)?,
         folder,
@@ -218,6 +221,10 @@ fn preview(args: &PreviewArgs) -> Result<Report> {
         size: args.size,
         part: args.part,
         wavelength: args.wavelength,
+        lamp: (args.lamp.is_some() || args.bandwidth.is_some()).then(|| {
+            let [diameter, distance] = args.lamp.unwrap_or([0.0, 1.0]);
+            Lamp { diameter, distance, bandwidth: args.bandwidth.unwrap_or(0.0), places: args.places }
+        }),
         memory: args.memory,
     };
     let place = Manifest::of(&args.folder)?.settings.plate.view.place;

@@ -42,6 +42,7 @@
 //! light out of a disc about the axis, where a stop for the zero order stands.
 
 pub mod band;
+pub(crate) mod band_search;
 pub mod binary;
 pub mod cells;
 pub mod double_phase;

@@ -9,17 +9,25 @@
 use super::geometry::{border, fringe_area, plate_from_file, tile_in_file, tile_on_plate};
 use super::plate::{Binarisation, FringeSettings, Plate, Polarity};
 use super::transfer::edge_phase;
+use crate::encode::band_search::{BLOCK, BandKernel};
 use crate::encode::error_diffusion::binarise;
 use crate::encode::fringe::Fringe;
 use crate::error::Result;
-use crate::field::Complex32;
+use crate::field::{Complex32, Complex64};
 use crate::progress::Progress;
 use crate::segments::{ObjectWave, Rect, Work};
 use rayon::prelude::*;
+use std::f64::consts::TAU;
 use std::time::Instant;
 
 /// Pixels beside and above a tile in which error diffusion settles: its errors are forgotten after some ten pixels.
 const HALO: i64 = 24;
+
+/// Pixels around a tile in which a direct search settles: a block, and half of one that its kernel reaches.
+pub(super) const SEARCH_HALO: i64 = BLOCK + BLOCK / 2;
+
+/// Sweeps of a direct search over each block.
+const SWEEPS: u32 = 4;
 
 /// The fringes of a plate.
 pub struct PlateFringes {
@@ -37,6 +45,8 @@ impl PlateFringes {
             plate.fringe;
         let fringe = Fringe::new(quantity, amplitude, reference_ratio).with_swing(bias as f32, contrast as f32);
         let pulses = bits == 1 && binarisation == Binarisation::PulseWidth;
+        // A search makes of wishes beyond its two levels what it can.
+        let searched = bits == 1 && binarisation == Binarisation::DirectSearch;
         let (lines, tone) = match &plate.transfer {
             None => (None, None),
             Some(transfer) => (transfer.lines(&plate.fringe), transfer.tone(&plate.fringe)),
@@ -58,6 +68,7 @@ impl PlateFringes {
                             fringe.open_arc(u, pulses).open((u * r.conj()).arg(), (inwards * edge) as f32)
                         }
                         None if pulses => fringe.pulse(u, r),
+                        None if searched => fringe.value(u, r),
                         None => fringe.value(u, r).clamp(0.0, 1.0),
                     };
                     let value = if polarity == Polarity::Negative { 1.0 - value } else { value };
@@ -74,9 +85,39 @@ impl PlateFringes {
         match self.plate.fringe.binarisation {
             _ if self.plate.fringe.bits != 1 => {}
             Binarisation::Diffusion => binarise(&mut levels, rect.width()),
+            Binarisation::DirectSearch => levels = self.searched(&levels, rect),
             _ => levels.iter_mut().for_each(|t| *t = if *t > 0.5 { 1.0 } else { 0.0 }),
         }
         levels
+    }
+
+    /// What a search makes of wishes on a rectangle: open or closed, without noise in the eye box.
+    ///
+    /// Lit with the reference r, the light that goes to the middle of the box is that along the wave w which converges there; s
+    /// = r·conj(w) takes it to the frequency 0, and the box is a band about it, of half width side/(2λD) at the distance D.
+    fn searched(&self, wishes: &[f32], rect: &Rect) -> Vec<f32> {
+        let (plate, grid) = (&self.plate, &self.wave.plane.grid);
+        let Some(eye_box) = plate.eye_box else { return wishes.to_vec() };
+        let distance = plate.view.viewer;
+        let shortest = plate.wavelengths().iter().copied().fold(f64::INFINITY, f64::min);
+        let pitch = [grid.pitch_x, grid.pitch_y];
+        let half = [0, 1].map(|axis| {
+            let side: f64 = 0.5 * eye_box[axis];
+            side / side.hypot(distance) / shortest * pitch[axis]
+        });
+        let mut unit = vec![Complex32::default(); wishes.len()];
+        unit.par_chunks_mut(rect.width()).enumerate().for_each_init(Vec::new, |reference, (i, line)| {
+            let row = rect.y[0] + i as i64;
+            let wavelength = plate.wavelength_of(row);
+            plate.reference.row(grid, wavelength, row, rect.x[0]..rect.x[1], reference);
+            let y = grid.y(row as usize) - plate.slit.as_ref().map_or(0.0, |slit| slit.y);
+            for ((s, r), column) in line.iter_mut().zip(reference.iter()).zip(rect.x[0]..) {
+                let turns = grid.x(column as usize).hypot(y).hypot(distance) / wavelength;
+                let wave = Complex64::cis(TAU * (turns - turns.floor()));
+                *s = r * Complex32::new(wave.re as f32, wave.im as f32);
+            }
+        });
+        BandKernel::new(half).search(wishes, &unit, rect.width(), [rect.x[0], rect.y[0]], SWEEPS)
     }
 
     /// The levels of a tile as the file shows them, `tile × tile` of them, 0 beyond the plate's edge; `amplitude` swings
@@ -91,8 +132,10 @@ impl PlateFringes {
         let highest = if plate.fringe.bits == 1 { 1.0 } else { 255.0 };
         let (mut wishes, mut work, mut grown) = (Vec::new(), Work::default(), core);
         if core.area() > 0 {
-            if plate.fringe.bits == 1 && plate.fringe.binarisation == Binarisation::Diffusion {
-                grown = core.grown(HALO, &area);
+            match plate.fringe.binarisation {
+                Binarisation::Diffusion if plate.fringe.bits == 1 => grown = core.grown(HALO, &area),
+                Binarisation::DirectSearch if plate.fringe.bits == 1 => grown = core.around(SEARCH_HALO, &area),
+                _ => {}
             }
             let pieces = self.wave.plane.pieces(&core, &grown);
             let (field, took) = self.wave.field(&grown, &pieces, progress)?;

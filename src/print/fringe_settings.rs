@@ -1,6 +1,7 @@
 //! How object and reference become levels.
 
 use crate::encode::Quantity;
+use crate::names::{Name, Named};
 use serde::{Deserialize, Serialize};
 
 /// How a fringe becomes one bit.
@@ -11,9 +12,22 @@ pub enum Binarisation {
     Threshold,
     /// Open where the phase of u·r* is within ±arcsin(|u|/A): the first order's amplitude follows |u| (Lee 1979).
     PulseWidth,
+    /// Begun as `threshold`; then pixels are turned over while that lowers the rounding noise which an eye box receives
+    /// ([`crate::encode`]'s search within a band): what lies elsewhere takes it.
+    DirectSearch,
     /// Floyd–Steinberg error diffusion, begun in a halo outside of each tile.
     #[default]
     Diffusion,
+}
+
+impl Named for Binarisation {
+    const KIND: &'static str = "binarisation";
+    const NAMES: &'static [Name<Self>] = &[
+        ("threshold", || Self::Threshold, "open where the fringe is above its middle"),
+        ("pulse-width", || Self::PulseWidth, "pulses as wide as the light is strong"),
+        ("direct-search", || Self::DirectSearch, "pixels turned over until an eye box is free of noise"),
+        ("diffusion", || Self::Diffusion, "error diffusion"),
+    ];
 }
 
 /// Which level is clear.

@@ -22,6 +22,7 @@ mod fringe_settings;
 mod gds;
 mod geometry;
 mod job;
+mod lamp;
 mod manifest;
 mod mask;
 mod mask_bytes;
@@ -39,6 +40,8 @@ mod printer;
 mod reader;
 mod reference;
 mod registration;
+#[cfg(test)]
+mod search_tests;
 mod shard;
 #[cfg(test)]
 mod tests;
@@ -52,6 +55,7 @@ pub use calibrate::PlateCalibration;
 pub use card_file::{WrittenCard, write_card};
 pub use fringe::PlateFringes;
 pub use job::{PlateJob, PrintReport, PrintSettings};
+pub use lamp::Lamp;
 pub use manifest::{Input, Manifest, Settings};
 pub use plan::{Plan, plan};
 pub use plate::{Binarisation, FileLayout, FringeSettings, Plate, Polarity, Quantity, Raster};

@@ -66,6 +66,10 @@ pub struct Plate {
     /// Largest angles of object light to the normal, along x and y [rad], where they are to be smaller than the widest that
     /// reference and pitch allow.
     pub object_angle: Option<[f64; 2]>,
+    /// Width and height of the place before the plate's middle, at the viewer's distance, that a direct search keeps free of
+    /// noise [m]; none for other fringes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub eye_box: Option<[f64; 2]>,
     /// Largest relative error of the computed field.
     pub error: f64,
     /// Seed of phases, jitter and light.

@@ -1,7 +1,8 @@
 //! What a plate's numbers may be, wherever they come from: a plate's file, or a manifest that somebody else may have written.
 
-use super::plate::{Plate, Raster};
+use super::plate::{Binarisation, Plate, Quantity, Raster};
 use crate::field::grid::LENGTHS;
+use crate::segments::PointPhase;
 
 /// Longest side of a plate [px]: 2.6 million would be 0.9 m at 0.35 µm.
 const LONGEST: u64 = 1 << 22;
@@ -46,6 +47,23 @@ impl Plate {
                     "slit: its strip must be 8 to the tile's {tile}, and its lengths those of a bench"
                 ));
             }
+        }
+        let searched = bits == 1 && self.fringe.binarisation == Binarisation::DirectSearch;
+        match self.eye_box {
+            Some(sides) if !sides.iter().all(|side| LENGTHS.contains(side)) => {
+                return Err("scene.eye_box: its sides must be lengths of a bench".into());
+            }
+            Some(_) if !searched => {
+                return Err("scene.eye_box is for binarisation = \"direct-search\"; leave it out".into());
+            }
+            None if searched => return Err("scene.eye_box is missing: a direct search needs it".into()),
+            _ => {}
+        }
+        if searched && self.fringe.quantity != Quantity::Bipolar {
+            return Err("direct-search makes the interference term alone; take quantity = \"bipolar\"".into());
+        }
+        if self.view.phase == PointPhase::Path && self.slit.is_some() {
+            return Err("scene.phase = \"path\" is for full parallax; a slit's strips have phases of their own".into());
         }
         if file.guard.saturating_mul(2) >= width.min(height) {
             return Err(format!("guard = {} on each side leaves no fringes of {width}×{height}", file.guard));

@@ -8,7 +8,7 @@ use super::transfer::TransferFile;
 use crate::config::ConfigFile;
 use crate::error::{Error, Result};
 use crate::points::colour::Lasers;
-use crate::segments::{Slit, Viewing};
+use crate::segments::{PointPhase, Slit, Viewing};
 use crate::units;
 use serde::Deserialize;
 use std::path::Path;
@@ -54,6 +54,13 @@ struct PlateFile {
     scene: SceneFile,
 }
 
+/// Sides of the eye box where none is given, as shares of the viewer's distance.
+const EYE_BOX: [f64; 2] = [0.2, 0.1];
+
+/// Contrast of a direct search where none is given: that of the threshold from which it begins. In 8 bits the same fringe
+/// would be clipped; in one bit more light reaches the eye, and the noise outside of its box grows instead.
+const SEARCHED: f64 = 3.0;
+
 fn one() -> u64 {
     1
 }
@@ -76,6 +83,9 @@ struct SceneFile {
     resolution: Option<String>,
     rays: Option<u32>,
     object_angle: Option<[String; 2]>,
+    #[serde(default)]
+    phase: PointPhase,
+    eye_box: Option<[String; 2]>,
 }
 
 #[derive(Deserialize)]
@@ -132,10 +142,10 @@ impl Plate {
         let [width, height] = asked.size.unwrap_or(size).pixels([pitch_x, pitch_y]);
         let raster = Raster { width, height, pitch_x, pitch_y };
         step.map_or(Ok(()), |step| check_step(&raster, step)).or_else(|what| at.refuse(what))?;
-        if file.bits == 8 && file.binarisation.is_some() {
+        if file.bits == 8 && file.binarisation.or(asked.binarisation).is_some() {
             return at.refuse("binarisation is for bits = 1; leave it out");
         }
-        let binarisation = file.binarisation.unwrap_or_default();
+        let binarisation = asked.binarisation.or(file.binarisation).unwrap_or_default();
         if file.bits == 1 && file.quantity != Quantity::Bipolar && binarisation == Binarisation::PulseWidth {
             return at.refuse("pulse-width makes its fringe from u·r* itself; take quantity = \"bipolar\"");
         }
@@ -220,6 +230,15 @@ impl Plate {
         if scene.scale.is_some_and(|scale| !(scale.is_finite() && scale > 0.0)) {
             return at.refuse("scene.scale must be greater than zero");
         }
+        let searched = file.bits == 1 && binarisation == Binarisation::DirectSearch;
+        let eye_box = match &scene.eye_box {
+            Some(sides) => {
+                let side = |text: &String| at.read("scene.eye_box", text, units::positive_length);
+                Some([side(&sides[0])?, side(&sides[1])?])
+            }
+            // Both eyes, and room to move the head by as much.
+            None => searched.then(|| EYE_BOX.map(|share| share * viewer)),
+        };
         let plate = Self {
             name: file.name,
             raster,
@@ -230,7 +249,11 @@ impl Plate {
                 bits: file.bits,
                 binarisation,
                 bias: at.within("bias", file.bias.unwrap_or(0.5), 0.0..=1.0)?,
-                contrast: at.within("contrast", file.contrast.unwrap_or(1.0), 1e-3..=1e3)?,
+                contrast: at.within(
+                    "contrast",
+                    file.contrast.unwrap_or(if searched { SEARCHED } else { 1.0 }),
+                    1e-3..=1e3,
+                )?,
                 percentile: at.within("percentile", file.percentile.unwrap_or(0.999), 0.5..=1.0)?,
                 reference_ratio: at.within("reference_ratio", file.reference_ratio.unwrap_or(1.0), 1e-3..=1e3)?,
                 polarity: file.polarity,
@@ -247,8 +270,10 @@ impl Plate {
                 },
                 place: -at.read("scene.distance", &scene.distance, units::length)?,
                 scale: scene.scale,
+                phase: asked.phase.unwrap_or(scene.phase),
             },
             object_angle,
+            eye_box,
             error: at.within("error", file.error.unwrap_or(if file.bits == 1 { 1e-2 } else { 5e-3 }), 1e-4..=0.1)?,
             seed: file.seed,
             printer: file.printer.as_ref().map(|printer| printer.read(at)).transpose()?,
@@ -285,7 +310,7 @@ mod tests {
             assert_eq!((same.raster.width, same.raster.height), (640, 384), "{to}");
             assert!((same.raster.pitch_x - 1e-6).abs() < 1e-20, "{to}");
         }
-        let asked = Asked { size: Some(PlateSize::Lengths([0.2e-3, 0.1e-3])), pitch: Some(0.5e-6) };
+        let asked = Asked { size: Some(PlateSize::Lengths([0.2e-3, 0.1e-3])), pitch: Some(0.5e-6), ..Asked::default() };
         let asked = Plate::parse_as(SMALL, Path::new("t.toml"), &asked).expect("plate");
         assert_eq!((asked.raster.width, asked.raster.height, asked.file.tile, asked.segment), (400, 200, 128, 128));
         let oblong = SMALL.replace("pitch = \"1um\"", "pitch_x = \"1um\"\npitch_y = \"0.5um\"");

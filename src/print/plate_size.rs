@@ -1,7 +1,8 @@
 //! How large a plate is: in pixels or in lengths, and the printer's step that its pixels stand on.
 
-use super::plate::Raster;
+use super::plate::{Binarisation, Raster};
 use crate::error::{Error, Result};
+use crate::segments::PointPhase;
 use crate::units;
 use serde::Deserialize;
 
@@ -48,6 +49,10 @@ pub struct Asked {
     pub size: Option<PlateSize>,
     /// Distance of neighbouring columns and rows [m].
     pub pitch: Option<f64>,
+    /// How one bit is made.
+    pub binarisation: Option<Binarisation>,
+    /// Where the points of a scene stand, and in which phases.
+    pub phase: Option<PointPhase>,
 }
 
 /// The key `size`: pixels, two lengths, or both in one text.

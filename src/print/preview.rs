@@ -8,6 +8,7 @@
 //! is that of the thinned field. That is carried to the pupil's plane by the exact angular spectrum about f_c, cut by the
 //! pupil, and carried back to the plane in focus.
 
+use super::lamp::{Lamp, LampLight};
 use super::plate::Plate;
 use super::reader::Reader;
 use super::reference::frequency_range;
@@ -37,6 +38,8 @@ pub struct PreviewSettings {
     pub part: Option<[u64; 4]>,
     /// Wavelength of the lamp [m]; the plate's own where `None`. Another one shows what white light would do.
     pub wavelength: Option<f64>,
+    /// How wide and how coloured the lamp is; a distant point of one wavelength where `None`.
+    pub lamp: Option<Lamp>,
     /// Memory that it may take [bytes].
     pub memory: u64,
 }
@@ -80,6 +83,31 @@ fn towards(from: [[f64; 2]; 2], to: [[f64; 2]; 2], distance: f64, wavelength: f6
 /// and focus, and a part that is not on the plate; [`Error::Memory`] past the budget, with what would help;
 /// [`Error::Interrupted`].
 pub fn preview(folder: &Path, settings: &PreviewSettings, progress: &Progress) -> Result<Preview> {
+    let Some(lamp) = &settings.lamp else { return lit(folder, settings, &[[0.0; 2]], progress) };
+    let wavelength = settings.wavelength.map_or_else(|| Ok(Reader::open(folder)?.plate().wavelength), Ok)?;
+    let mut sum: Option<Preview> = None;
+    for LampLight { wavelength, share, tilts } in lamp.light(wavelength)? {
+        let settings = PreviewSettings { wavelength: Some(wavelength), ..settings.clone() };
+        let mut seen = lit(folder, &settings, &tilts, progress)?;
+        seen.picture.values.iter_mut().for_each(|v| *v *= share as f32);
+        seen.passed *= share;
+        sum = Some(match sum {
+            None => seen,
+            Some(mut sum) => {
+                sum.picture.values.iter_mut().zip(&seen.picture.values).for_each(|(sum, v)| *sum += v);
+                sum.passed += seen.passed;
+                sum.dazzled |= seen.dazzled;
+                sum.thinned = [0, 1].map(|axis| sum.thinned[axis].min(seen.thinned[axis]));
+                sum.transform = [0, 1].map(|axis| sum.transform[axis].max(seen.transform[axis]));
+                sum
+            }
+        });
+    }
+    sum.ok_or_else(|| Error::parameter("lamp", "has no light"))
+}
+
+/// The mean over places of a lamp of one wavelength, whose light differs from the reference by `tilts` [cycles/m].
+fn lit(folder: &Path, settings: &PreviewSettings, tilts: &[[f64; 2]], progress: &Progress) -> Result<Preview> {
     let mut reader = Reader::open(folder)?;
     let plate = reader.plate().clone();
     let [_, _, ez] = settings.eye;
@@ -103,7 +131,7 @@ pub fn preview(folder: &Path, settings: &PreviewSettings, progress: &Progress) -
             (400.0 * sides / sides.max_element()).to_array().map(|side| (side.round() as usize).max(1));
         (width, height)
     });
-    let eye = Eye { plate: &plate, settings, wavelength };
+    let eye = Eye { plate: &plate, settings, wavelength, tilts };
     let mut pieces = 1;
     let cuts = loop {
         let cut = |range: [i64; 2], cells: usize| -> Vec<(std::ops::Range<usize>, [i64; 2])> {
@@ -164,6 +192,7 @@ struct Eye<'a> {
     plate: &'a Plate,
     settings: &'a PreviewSettings,
     wavelength: f64,
+    tilts: &'a [[f64; 2]],
 }
 
 /// How one piece is looked at.
@@ -208,13 +237,19 @@ impl Eye<'_> {
         [ex, ey].map(|e| [e - 0.5 * pupil, e + 0.5 * pupil])
     }
 
+    /// Largest tilt along an axis [cycles/m].
+    fn widest(&self, axis: usize) -> f64 {
+        self.tilts.iter().map(|tilt| tilt[axis].abs()).fold(0.0, f64::max)
+    }
+
     /// Whether some of the lamp's light goes through a part of the plate straight into the pupil.
     fn dazzled(&self, part: &Rect) -> bool {
         let lamp = self.plate.reference.frequencies(&self.plate.raster.grid(), self.wavelength);
         (0..2).all(|axis| {
             let ends = [edges(self.plate, part), self.opening()];
             let [low, high] = towards(ends[0], ends[1], self.settings.eye[2], self.wavelength, axis);
-            lamp[axis][0] <= high && lamp[axis][1] >= low
+            let wide = self.widest(axis);
+            lamp[axis][0] - wide <= high && lamp[axis][1] + wide >= low
         })
     }
 
@@ -224,7 +259,8 @@ impl Eye<'_> {
         // Out of focus the plate's light is blurred over the pupil's image on it; and the pupil diffracts: nine tenths of
         // a spot's light lie within two of its rings, the rest falls with the cube of the distance.
         let pitches = [plate.raster.pitch_x, plate.raster.pitch_y];
-        let blur = 0.5 * pupil * focus.abs() / (ez - focus) + 12.0 * self.wavelength * ez / pupil;
+        let tilted = self.widest(0).max(self.widest(1)) * self.wavelength * focus.abs();
+        let blur = 0.5 * pupil * focus.abs() / (ez - focus) + 12.0 * self.wavelength * ez / pupil + tilted;
         let [across, down] = pitches.map(|pitch| (1.1 * blur / pitch).ceil() as i64);
         let lit = Rect {
             x: [(shown.x[0] - across).max(part.x[0]), (shown.x[1] + across).min(part.x[1])],
@@ -235,7 +271,9 @@ impl Eye<'_> {
         for axis in 0..2 {
             let [low, high] = towards(edges(plate, &lit), opening, *ez, self.wavelength, axis);
             carrier[axis] = 0.5 * (low + high);
-            factor[axis] = ((USABLE / (pitches[axis] * (high - low))).floor() as usize).clamp(1, 64);
+            // What a tilt brings to the pupil would go beside it without.
+            let band = high - low + 2.0 * self.widest(axis);
+            factor[axis] = ((USABLE / (pitches[axis] * band)).floor() as usize).clamp(1, 64);
         }
         let kept = [lit.width().div_ceil(factor[0]), lit.height().div_ceil(factor[1])];
         let pitch = [0, 1].map(|axis| pitches[axis] * factor[axis] as f64);
@@ -271,23 +309,30 @@ impl Eye<'_> {
         let wave = Carried { wavelength: self.wavelength, carrier: look.carrier };
         let thinned = thin(reader, plate, &look.lit, thinning, look.kept, &wave, progress)?;
         let pupil_grid = Grid::new(look.pupil[0], look.pupil[1], pitch_x, pitch_y)?.centered_at([*ex, *ey]);
-        progress.start("to the pupil", 0);
-        let mut at_pupil = wave.propagate(thinned, &grid, &pupil_grid, *ez, progress)?;
+        let window = Grid::new(look.window[0], look.window[1], pitch_x, pitch_y)?.centered_at(look.center);
         // Power, so that pieces and colours of other samplings compare.
         let area = pitch_x * pitch_y;
         let energy = |field: &[Complex32]| area * field.iter().map(|u| f64::from(u.norm_sqr())).sum::<f64>();
-        let arriving = energy(&at_pupil);
-        for (index, u) in at_pupil.iter_mut().enumerate() {
-            let (x, y) = (pupil_grid.x(index % pupil_grid.width) - ex, pupil_grid.y(index / pupil_grid.width) - ey);
-            if x.hypot(y) > 0.5 * pupil {
-                *u = Complex32::default();
+        let share = 1.0 / self.tilts.len() as f64;
+        let mut values = vec![0.0f32; window.len()];
+        let (mut arriving, mut passed) = (0.0, 0.0);
+        for &[tilt_x, tilt_y] in self.tilts {
+            // The samples stay what they are about a carrier that is tilted with them.
+            let wave = Carried { carrier: [wave.carrier[0] + tilt_x, wave.carrier[1] + tilt_y], ..wave };
+            progress.start("to the pupil", 0);
+            let mut at_pupil = wave.propagate(&thinned, &grid, &pupil_grid, *ez, progress)?;
+            arriving += share * energy(&at_pupil);
+            for (index, u) in at_pupil.iter_mut().enumerate() {
+                let (x, y) = (pupil_grid.x(index % pupil_grid.width) - ex, pupil_grid.y(index / pupil_grid.width) - ey);
+                if x.hypot(y) > 0.5 * pupil {
+                    *u = Complex32::default();
+                }
             }
+            passed += share * energy(&at_pupil);
+            progress.start("to the focus", 0);
+            let seen = wave.propagate(&at_pupil, &pupil_grid, &window, focus - ez, progress)?;
+            values.iter_mut().zip(&seen).for_each(|(v, u)| *v += (share * area) as f32 * u.norm_sqr());
         }
-        let passed = energy(&at_pupil);
-        let window = Grid::new(look.window[0], look.window[1], pitch_x, pitch_y)?.centered_at(look.center);
-        progress.start("to the focus", 0);
-        let seen = wave.propagate(at_pupil, &pupil_grid, &window, focus - ez, progress)?;
-        let values: Vec<f32> = seen.iter().map(|u| area as f32 * u.norm_sqr()).collect();
         Ok((Picture::from_samples(&window, &values, look.half, size.0, size.1), [arriving, passed]))
     }
 }
@@ -312,7 +357,7 @@ impl Carried {
     /// The band-limited angular spectrum of [`crate::propagation`], with each frequency's true one f + f_c.
     fn propagate(
         &self,
-        samples: Vec<Complex32>,
+        samples: &[Complex32],
         input: &Grid,
         output: &Grid,
         distance: f64,
@@ -324,7 +369,6 @@ impl Carried {
         for (line, row) in field.chunks_exact_mut(padded.width).zip(samples.chunks_exact(input.width)) {
             line[..row.len()].copy_from_slice(row);
         }
-        drop(samples);
         let shift = [output.x(0) - input.x(0), output.y(0) - input.y(0)];
         let bands = [
             band(self.wavelength, distance, output.center[0] - input.center[0], padded.extent_x()),

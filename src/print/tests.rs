@@ -29,7 +29,7 @@ pub(super) fn point(x: f64, y: f64, z: f64) -> PointSource {
     PointSource { position: DVec3::new(x, y, z), amplitude: 1e-3, phase: 0.7 }
 }
 
-fn cloud(count: u64) -> Vec<PointSource> {
+pub(super) fn cloud(count: u64) -> Vec<PointSource> {
     let at = |i: u64| {
         let mut random = Random::new(5, i);
         let mut side = |half: f64| (2.0 * random.uniform() - 1.0) * half;
@@ -251,6 +251,7 @@ fn previews_show_points_where_they_are_from_every_eye_and_file() {
                     size: Some((192, 144)),
                     part: None,
                     wavelength: None,
+                    lamp: None,
                     memory: 1 << 30,
                 };
                 let seen = preview(&path, &settings, &Progress::new()).expect("preview");
@@ -270,6 +271,7 @@ fn previews_show_points_where_they_are_from_every_eye_and_file() {
             size: Some((8, 8)),
             part: Some([0, 0, 769, 4]),
             wavelength: None,
+            lamp: None,
             memory: 1 << 30,
         };
         assert!(preview(&path, &wrong, &Progress::new()).unwrap_err().to_string().contains("not on the plate"));

@@ -99,6 +99,10 @@ impl Transfer {
             Some(bias) if !bias.iter().all(|b| b.abs() <= MOST_BIAS) => {
                 Err(format!("transfer.line_bias must lie between -{MOST_BIAS} and {MOST_BIAS} m"))
             }
+            Some(_) if fringe.binarisation == Binarisation::DirectSearch => Err(
+                "transfer.line_bias undoes lines, not the dots of a direct search; take binarisation = \"threshold\""
+                    .into(),
+            ),
             Some(_) if levels.is_empty() && fringe.binarisation == Binarisation::Diffusion => {
                 Err("transfer.line_bias undoes lines, not the dots of error diffusion; give levels and amplitude, or \
                  binarisation = \"threshold\""
@@ -116,7 +120,10 @@ impl Transfer {
 
     /// How much lines grow, where it was measured and the plate is drawn in lines [m].
     pub(super) fn lines(&self, fringe: &FringeSettings) -> Option<[f64; 2]> {
-        self.line_bias.filter(|_| fringe.bits == 1 && fringe.binarisation != Binarisation::Diffusion)
+        self.line_bias.filter(|_| {
+            let dots = matches!(fringe.binarisation, Binarisation::Diffusion | Binarisation::DirectSearch);
+            fringe.bits == 1 && !dots
+        })
     }
 }
 

@@ -1,5 +1,6 @@
 //! How a finished plate looks to an eye, in the light of its lamps, and how it should by ray tracing.
 
+use super::lamp::Lamp;
 use super::manifest::{Manifest, Settings};
 use super::preview::{Preview, PreviewSettings, preview};
 use crate::error::{Error, Result};
@@ -22,6 +23,9 @@ pub struct ViewReport {
     pub focus: f64,
     /// Wavelengths of the lamps [m].
     pub wavelengths: Vec<f64>,
+    /// The lamp, where it was not a distant point of one wavelength.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lamp: Option<Lamp>,
     /// Middle (x, y) of the picture on the plane in focus [m].
     pub center: [f64; 2],
     /// Its half width and half height [m].
@@ -81,6 +85,7 @@ impl PlateView {
             eye: settings.eye,
             focus: settings.focus,
             wavelengths,
+            lamp: settings.lamp,
             center: gray.center,
             half: gray.half.to_array(),
             passed: gray.passed,
@@ -105,7 +110,7 @@ impl PlateView {
     /// Texts of a picture's file.
     fn texts(&self, what: &str) -> [(&'static str, String); 2] {
         let ViewReport { eye, focus, wavelengths, center, half, .. } = &self.report;
-        let described = serde_json::json!({
+        let mut described = serde_json::json!({
             "simulated": true,
             "eye": eye,
             "focus": focus,
@@ -114,6 +119,9 @@ impl PlateView {
             "center": center,
             "half": half,
         });
+        if let Some(lamp) = &self.report.lamp {
+            described["lamp"] = serde_json::json!(lamp);
+        }
         [("Description", what.to_owned()), ("holodrive", described.to_string())]
     }
 

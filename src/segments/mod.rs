@@ -34,6 +34,6 @@ mod wave;
 
 pub(crate) use object::is_cloud;
 pub use object::{Object, SceneOptions};
-pub use plane::{ObjectBand, Piece, Rect, Segments, Slit, Viewing};
+pub use plane::{ObjectBand, Piece, PointPhase, Rect, Segments, Slit, Viewing};
 pub use scene::PlacedScene;
 pub use wave::{ObjectWave, SegmentedField, Work};

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::field::Grid;
+use crate::names::{Name, Named};
 use crate::points::budget::EYE_ANGLE;
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +36,10 @@ impl Rect {
     pub(crate) fn and(&self, other: &Self) -> Self {
         let both = |a: [i64; 2], b: [i64; 2]| [a[0].max(b[0]), a[1].min(b[1]).max(a[0].max(b[0]))];
         Self { x: both(self.x, other.x), y: both(self.y, other.y) }
+    }
+    /// Grown to all sides, within bounds.
+    pub(crate) fn around(&self, halo: i64, bounds: &Self) -> Self {
+        Self { x: [self.x[0] - halo, self.x[1] + halo], y: [self.y[0] - halo, self.y[1] + halo] }.and(bounds)
     }
     /// Grown to the sides and upwards, within bounds.
     pub(crate) fn grown(&self, halo: i64, bounds: &Self) -> Self {
@@ -125,12 +130,42 @@ pub struct Viewing {
     pub place: f64,
     /// Metres at the plane for one metre of the scene; fitted into the view where `None`.
     pub scale: Option<f64>,
+    /// Where points stand on what is seen, and in which phases.
+    #[serde(default, skip_serializing_if = "PointPhase::is_random")]
+    pub phase: PointPhase,
+}
+
+/// Where the points of a scene stand on what is seen, and in which phases.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PointPhase {
+    /// Anywhere in cubic cells, in independent phases: light goes into the whole cone as from a matte surface, with speckle.
+    #[default]
+    Random,
+    /// On a lattice of directions from the viewer's eye, all waves in step there: no speckle. In other places before the plate
+    /// the light comes in spots, λ over the angle of the lattice apart: less than a pupil, where the eye separates as
+    /// much as a pupil diffracts.
+    Path,
+}
+
+impl Named for PointPhase {
+    const KIND: &'static str = "phase";
+    const NAMES: &'static [Name<Self>] = &[
+        ("random", || Self::Random, "as from a matte surface"),
+        ("path", || Self::Path, "all waves reach the eye in step"),
+    ];
+}
+
+impl PointPhase {
+    fn is_random(&self) -> bool {
+        *self == Self::Random
+    }
 }
 
 impl Default for Viewing {
     /// A scene 150 mm behind the plane, seen from 600 mm by a healthy eye.
     fn default() -> Self {
-        Self { viewer: 0.6, resolution: EYE_ANGLE, rays: 2, place: -0.15, scale: None }
+        Self { viewer: 0.6, resolution: EYE_ANGLE, rays: 2, place: -0.15, scale: None, phase: PointPhase::Random }
     }
 }
 

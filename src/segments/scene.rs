@@ -13,11 +13,11 @@
 //! surface thus send waves from the same points in the same phases, and their fields go over into each other. Its amplitude
 //! is √(Σ radiance × solid angle × distance²) over the segment's own rays: |u|² is then the irradiance.
 
-use super::plane::{Segments, Viewing};
+use super::plane::{PointPhase, Segments, Viewing};
 use crate::error::{Error, Result};
 use crate::field::Grid;
 use crate::illumination::Illumination;
-use crate::points::placement::WorldPoint;
+use crate::points::placement::{Phase, WorldPoint};
 use crate::points::trace::{self, TraceSettings};
 use crate::points::white::white_level;
 use crate::points::{Channel, Placement, PointSource, WhitePoint};
@@ -38,6 +38,10 @@ pub struct PlacedScene {
     white: f32,
     bounces: u32,
 }
+
+/// Depth of a cell of [`PointPhase::Path`] over its width: from a tenth of the viewer's distance aside, half of it
+/// moves a point by less than a half of what the eye separates.
+const LAYER: f64 = 8.0;
 
 /// Most rays of one segment.
 const MOST_RAYS: f64 = 16e6;
@@ -238,15 +242,36 @@ impl PlacedScene {
         let (seen, rays) = self.look(plane, &sight, progress)?;
         // Solid angle of a pixel on the axis; off it by the cube of the cosine.
         let pixel = (2.0 * tall / rays).powi(2);
+        let eye = DVec3::new(0.0, 0.0, plane.view.viewer);
+        let path = plane.view.phase == PointPhase::Path;
         let light = |point: &WorldPoint| {
-            let [column, row, depth] = point.position.to_array().map(|value| self.index(value));
+            let place = if path { self.lattice_from_hologram(plane, eye, point.position) } else { point.position };
+            let [column, row, depth] = place.to_array().map(|value| self.index(value));
             let direction = point.position - apex;
             let cosine = direction.z.abs() / direction.length();
             let solid = pixel * cosine.powi(3) * direction.length_squared();
             let power = f64::from(Channel::Luminance.of(point.radiance).max(0.0)) * solid;
             Some((column? << 42 | row? << 21 | depth?, power))
         };
-        for (key, power) in summed(seen.iter().filter_map(light).collect()) {
+        let cells = summed(seen.iter().filter_map(light).collect());
+        if path {
+            // Cells one behind the other are one surface: from the eye their waves add up in step.
+            let cells: Vec<(u64, f64)> = cells.collect();
+            for run in cells.chunk_by(|a, b| a.0 + 1 == b.0) {
+                let whole: f64 = run.iter().map(|(_, power)| power).sum();
+                for &(key, power) in run.iter().filter(|(_, power)| *power > 0.0) {
+                    let [x, y, z] = [42, 21, 0].map(|shift| self.middle(key, shift));
+                    let position = self.hologram_from_lattice(plane, eye, DVec3::new(x, y, z));
+                    if (position.z > 0.0) != front {
+                        continue;
+                    }
+                    let phase = Phase::Path.of(0, (eye - position).length(), plane.wavelength);
+                    points.push(PointSource { position, amplitude: (power / whole.sqrt()) as f32, phase });
+                }
+            }
+            return Ok(());
+        }
+        for (key, power) in cells {
             let mut random = Random::new(plane.seed, key);
             let mut at = |shift: u32| self.place(key, shift, &mut random);
             let (x, y, z) = (at(42), at(21), at(0));
@@ -256,6 +281,26 @@ impl PlacedScene {
             points.push(PointSource { position, amplitude: power.sqrt() as f32, phase: random.phase() });
         }
         Ok(())
+    }
+
+    /// Where a place of the hologram frame lies on the lattice of [`PointPhase::Path`] [m]: its direction from the eye, as a
+    /// length at the scene's nearest depth, and its depth, `LAYER` times as coarse.
+    fn lattice_from_hologram(&self, plane: &Segments, eye: DVec3, place: DVec3) -> DVec3 {
+        let scale = self.cell / plane.view.resolution.tan() / (eye.z - place.z);
+        DVec3::new(scale * place.x, scale * place.y, place.z / LAYER)
+    }
+
+    /// The inverse of [`Self::lattice_from_hologram`].
+    fn hologram_from_lattice(&self, plane: &Segments, eye: DVec3, place: DVec3) -> DVec3 {
+        let z = place.z * LAYER;
+        let scale = self.cell / plane.view.resolution.tan() / (eye.z - z);
+        DVec3::new(place.x / scale, place.y / scale, z)
+    }
+
+    /// The middle of the cell whose index begins at a bit of a key [m].
+    fn middle(&self, key: u64, shift: u32) -> f64 {
+        let index = (key >> shift & ((1 << 21) - 1)) as f64 - f64::from(1 << 20);
+        (index + 0.5) * self.cell
     }
 
     /// Index of the cell in which a coordinate lies, 21 bits; none beyond a million cells.

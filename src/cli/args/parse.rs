@@ -62,6 +62,14 @@ pub(crate) fn position(text: &str) -> Result<[f64; 3], String> {
     three(text, units::length, "x,y,z such as 0mm,0mm,600mm")
 }
 
+/// Diameter and distance of a lamp [m].
+pub(super) fn lamp(text: &str) -> Result<[f64; 2], String> {
+    let (diameter, distance) = text.split_once(',').ok_or("give diameter and distance such as 2mm,300mm")?;
+    let diameter = units::length(diameter.trim()).map_err(|e| e.to_string())?;
+    let distance = units::positive_length(distance.trim()).map_err(|e| e.to_string())?;
+    Ok([diameter, distance])
+}
+
 /// Which three lasers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Wavelengths {

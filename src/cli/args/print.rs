@@ -1,9 +1,10 @@
 //! Flags of plates.
 
-use super::parse::{White, one_of, part, position, size, white};
+use super::parse::{White, lamp, one_of, part, position, size, white};
 use super::scene::FileArgs;
-use crate::print::PlateSize;
 use crate::print::export::Format;
+use crate::print::{Binarisation, PlateSize};
+use crate::segments::PointPhase;
 use crate::units;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -25,6 +26,12 @@ pub(crate) struct PrintArgs {
     /// Distance of its pixels in place of its own, or dots per inch.
     #[arg(long, value_parser = units::pitch, value_name = "0.5um|5080dpi")]
     pub(crate) pitch: Option<f64>,
+    /// How one bit is made in place of the plate's own way.
+    #[arg(long, value_parser = one_of::<Binarisation>(), value_name = "WAY")]
+    pub(crate) binarisation: Option<Binarisation>,
+    /// Where the points of a scene stand, and in which phases, in place of the plate's own.
+    #[arg(long, value_parser = one_of::<PointPhase>(), value_name = "PHASE")]
+    pub(crate) phase: Option<PointPhase>,
     /// Folder for the plate. One that was begun with the same settings is gone on with; one of others is refused.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
@@ -62,7 +69,7 @@ pub(crate) enum PrintCommand {
     Verify(VerifyArgs),
     /// Show what an eye sees of a finished plate, from the fringes in its file.
     #[command(
-        after_long_help = "Examples:\n  holodrive print preview plate --eye 0mm,0mm,60mm --focus -6mm -o seen.png\n  holodrive print preview plate --eye 5mm,0mm,60mm --focus -6mm --traced scenes/cornell.gltf -o right.png"
+        after_long_help = "Examples:\n  holodrive print preview plate --eye 0mm,0mm,60mm --focus -6mm -o seen.png\n  holodrive print preview plate --eye 5mm,0mm,60mm --focus -6mm --traced scenes/cornell.gltf -o right.png\n  holodrive print preview plate --eye 0mm,0mm,60mm --focus -6mm --lamp 2mm,300mm --bandwidth 20nm -o in-life.png"
     )]
     Preview(PreviewArgs),
     /// Write a finished plate in another format.
@@ -94,6 +101,15 @@ pub(crate) struct PreviewArgs {
     /// Wavelength of the lamp [default: the plate's; all three of a plate in colour].
     #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) wavelength: Option<f64>,
+    /// Diameter and distance of the lamp: its places' pictures add up, which blurs and averages speckle out [default: a point far away].
+    #[arg(long, value_parser = lamp, value_name = "DIAMETER,DISTANCE")]
+    pub(crate) lamp: Option<[f64; 2]>,
+    /// Full width at half maximum of the lamp's spectrum about each of the plate's wavelengths [default: 0nm, a laser].
+    #[arg(long, value_parser = units::length, value_name = "LENGTH")]
+    pub(crate) bandwidth: Option<f64>,
+    /// Places and wavelengths of the lamp that are looked at.
+    #[arg(hide_short_help = true, long, default_value_t = 48, value_name = "N")]
+    pub(crate) places: usize,
     /// The picture to write (8 bit, sRGB-coded).
     #[arg(short, long, default_value = "preview.png", value_name = "FILE")]
     pub(crate) output: PathBuf,
