@@ -197,8 +197,7 @@ impl<'a> Descent<'a> {
         };
         let pulls: Vec<Complex32> = field.iter().zip(seen).zip(&self.plane.wanted).map(pull).collect();
         let back = self.plane.backward(&pulls);
-        let slope = |(pulled, modulated): (&Complex32, &Complex32)| -2.0 * (pulled.conj() * modulated).im;
-        let slopes = self.model.pulled_back(back.par_iter().zip(modulated).map(slope).collect());
+        let slopes = self.model.slopes(&self.wishes, &back, modulated);
         if self.count == 0 {
             // Of about one, whatever the picture's unit: squares of slopes must not vanish in single precision.
             let squares = slopes.par_chunks(1 << 14).map(|part| part.iter().map(|s| f64::from(s * s)).sum::<f64>());
