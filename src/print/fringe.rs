@@ -3,13 +3,15 @@
 //! A tile depends on the plate, the source, the gain and its index, and on nothing else: not on threads, order, neighbours
 //! or what was computed before.
 //!
-//! There are no seams: the wave has none ([`crate::segments`]), and error diffusion begins in a halo to the left, to the
-//! right and above the tile, whose pixels are the same fringe, so that it has settled at the edge.
+//! The wave has no seams ([`crate::segments`]), and error diffusion begins in a halo to the left, to the
+//! right and above the tile, whose pixels are the same fringe, so that it has settled at the edge. A direct search keeps the
+//! error of its tile alone, nothing around it, out of the band: those of several tiles then add up and need not fit together. A strip of some eight
+//! pixels along its edge keeps about a fifth more noise than the rest.
 
 use super::geometry::{border, fringe_area, plate_from_file, tile_in_file, tile_on_plate};
 use super::plate::{Binarisation, FringeSettings, Plate, Polarity};
 use super::transfer::edge_phase;
-use crate::encode::band_search::{BLOCK, BandKernel};
+use crate::encode::band_search::BandKernel;
 use crate::encode::error_diffusion::binarise;
 use crate::encode::fringe::Fringe;
 use crate::error::Result;
@@ -22,9 +24,6 @@ use std::time::Instant;
 
 /// Pixels beside and above a tile in which error diffusion settles: its errors are forgotten after some ten pixels.
 const HALO: i64 = 24;
-
-/// Pixels around a tile in which a direct search settles: a block, and half of one that its kernel reaches.
-pub(super) const SEARCH_HALO: i64 = BLOCK + BLOCK / 2;
 
 /// Sweeps of a direct search over each block.
 const SWEEPS: u32 = 4;
@@ -132,10 +131,8 @@ impl PlateFringes {
         let highest = if plate.fringe.bits == 1 { 1.0 } else { 255.0 };
         let (mut wishes, mut work, mut grown) = (Vec::new(), Work::default(), core);
         if core.area() > 0 {
-            match plate.fringe.binarisation {
-                Binarisation::Diffusion if plate.fringe.bits == 1 => grown = core.grown(HALO, &area),
-                Binarisation::DirectSearch if plate.fringe.bits == 1 => grown = core.around(SEARCH_HALO, &area),
-                _ => {}
+            if plate.fringe.bits == 1 && plate.fringe.binarisation == Binarisation::Diffusion {
+                grown = core.grown(HALO, &area);
             }
             let pieces = self.wave.plane.pieces(&core, &grown);
             let (field, took) = self.wave.field(&grown, &pieces, progress)?;

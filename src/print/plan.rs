@@ -1,6 +1,6 @@
 //! What a plate will take, and every reason why it would be wrong: found on a few small fields before the work.
 
-use super::fringe::{PlateFringes, SEARCH_HALO};
+use super::fringe::PlateFringes;
 use super::geometry::{file_raster, fringe_area, tile_counts};
 use super::plate::{Binarisation, Quantity};
 use super::reference::Reference;
@@ -185,17 +185,17 @@ pub fn plan(fringes: &PlateFringes, folder: &Path, progress: &Progress) -> Resul
     let points = share(work.points as f64, work.segments as f64);
     let per_segment = points * share(whole.points_seconds, whole.points as f64);
     let side = plate.file.tile as f64;
-    let (halo, per_halo) = match plate.fringe.binarisation {
+    let (halo, per_pixel_bytes) = match plate.fringe.binarisation {
         Binarisation::Diffusion if plate.fringe.bits == 1 => ((1.0 + 48.0 / side) * (1.0 + 24.0 / side), 12),
-        Binarisation::DirectSearch if plate.fringe.bits == 1 => ((1.0 + 2.0 * SEARCH_HALO as f64 / side).powi(2), 44),
+        Binarisation::DirectSearch if plate.fringe.bits == 1 => (1.0, 44),
         _ => (1.0, 12),
     };
     let fringe = share(whole.fringe_seconds, whole.pixels as f64);
     let seconds = pixels * halo * (per_pixel + fringe) + per_segment * sample.segments as f64;
     let layout = Layout::new(plate);
-    let side = plate.file.tile + if per_halo == 12 { 48 } else { 2 * SEARCH_HALO as u64 };
+    let side = plate.file.tile + 48;
     let segment = (plate.segment / u64::from(divisor[0])) * (plate.segment / u64::from(divisor[1]));
-    let memory = side * side * per_halo
+    let memory = side * side * per_pixel_bytes
         + plate.file.tile * plate.file.tile * 3
         + segment * 8
         + sample.most_points * 400

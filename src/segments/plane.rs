@@ -37,10 +37,6 @@ impl Rect {
         let both = |a: [i64; 2], b: [i64; 2]| [a[0].max(b[0]), a[1].min(b[1]).max(a[0].max(b[0]))];
         Self { x: both(self.x, other.x), y: both(self.y, other.y) }
     }
-    /// Grown to all sides, within bounds.
-    pub(crate) fn around(&self, halo: i64, bounds: &Self) -> Self {
-        Self { x: [self.x[0] - halo, self.x[1] + halo], y: [self.y[0] - halo, self.y[1] + halo] }.and(bounds)
-    }
     /// Grown to the sides and upwards, within bounds.
     pub(crate) fn grown(&self, halo: i64, bounds: &Self) -> Self {
         Self { x: [self.x[0] - halo, self.x[1] + halo], y: [self.y[0] - halo, self.y[1]] }.and(bounds)
