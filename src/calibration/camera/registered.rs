@@ -94,7 +94,8 @@ impl CameraView {
     /// what a fiftieth of its pixels does not pass: most of a photo is beside the picture.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a photo of another size than the calibration's.
+    /// [`Error::Parameter`] for a photo of another size than the calibration's, or one whose light at the places has a
+    /// mean, weighted by itself, of less than three of the camera's gray levels.
     pub fn registered(&self, photo: &CameraPhoto, places: &[[f64; 2]]) -> Result<Vec<f32>> {
         let size = self.mapping.size;
         if [photo.width, photo.height] != size {
@@ -111,8 +112,32 @@ impl CameraView {
             Some(value) if value < full => value - dark,
             _ => f32::NAN,
         };
-        Ok(places.iter().map(seen).collect())
+        let seen: Vec<f32> = places.iter().map(seen).collect();
+        let step = gray_step(sorted);
+        // Weighted by itself: most of a picture may be dark.
+        let lit = seen.iter().filter(|v| **v > 0.0).map(|v| f64::from(*v));
+        let (sum, squares) = lit.fold((0.0, 0.0), |(sum, squares), v| (sum + v, squares + v * v));
+        if squares <= LEAST_LEVELS * f64::from(step) * sum {
+            let what = format!(
+                "is underexposed: the picture's light is {:.1} of the camera's gray levels, {LEAST_LEVELS} are needed; expose for the \
+                 picture (the zero order may be overexposed)",
+                squares / sum.max(f64::MIN_POSITIVE) / f64::from(step)
+            );
+            return Err(Error::parameter("photo", what));
+        }
+        Ok(seen)
     }
+}
+
+/// Gray levels above the dark level that a picture's light must have.
+const LEAST_LEVELS: f64 = 3.0;
+
+/// A camera's gray level, in a photo's unit: the least difference of two pixels, but for rounding.
+fn gray_step(mut values: Vec<f32>) -> f32 {
+    values.sort_unstable_by(f32::total_cmp);
+    let rounding = 1e-6 * values.last().map_or(0.0, |v| v.abs());
+    let steps = values.windows(2).map(|pair| pair[1] - pair[0]);
+    steps.filter(|step| *step > rounding).fold(f32::INFINITY, f32::min)
 }
 
 #[cfg(test)]
@@ -138,6 +163,10 @@ mod tests {
         assert!(view.places(&[[0.04, 0.0]]).is_err());
         assert_eq!(view.room([-0.5, 0.25, 1.0, 0.5]).expect("room"), [-0.03125, -0.03125, 0.0625, -0.015625]);
         assert!(view.room([0.5, 0.25, 0.5, 0.5]).is_err() && view.room([-0.5, 0.25, 1.1, 0.5]).is_err());
+        // Two gray levels of a camera, whatever the unit.
+        let dim = (0..64 * 48).map(|i| 0.01 * ((i % 64 / 16 + i / 64 / 16) / 2) as f32).collect();
+        let told = view.registered(&CameraPhoto::new(64, 48, dim).expect("photo"), &places).expect_err("dim");
+        assert!(told.to_string().contains("underexposed"), "{told}");
         let other = CameraPhoto::new(48, 64, photo.values.clone()).expect("photo");
         assert!(view.registered(&other, &places).is_err());
         for text in ["", "{}", r#"{"size": [64, 48], "mapping": [0], "half_window": 0.1}"#] {

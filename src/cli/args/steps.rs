@@ -150,10 +150,11 @@ pub(crate) struct LoopArgs {
     /// `calibrate camera` wrote it (mine-camera.json; its profile is --panel).
     #[arg(hide_short_help = true, long, value_name = "FILE", requires = "camera_command")]
     pub(crate) in_the_loop: Option<PathBuf>,
-    /// Command that shows a frame and takes its photo: {frame} is the frame's PNG, {photo} the photo's path without an ending.
+    /// Command that shows a frame and takes its photo: {frame} is the frame's PNG, {photo} the photo's path without an ending. Expose
+    /// for the picture; the zero order may be overexposed.
     #[arg(hide_short_help = true, long, value_name = "COMMAND", requires = "in_the_loop")]
     pub(crate) camera_command: Option<String>,
-    /// Photos that are taken.
+    /// Photos that are taken, and a second one of the first frame, which tells the camera's noise.
     #[arg(hide_short_help = true, long, default_value_t = 30, value_name = "N", requires = "in_the_loop")]
     pub(crate) camera_photos: usize,
     /// Room for the picture, in halves of the window of the focal plane that was calibrated, right and up from the axis.

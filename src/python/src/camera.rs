@@ -106,15 +106,16 @@ pub(crate) fn calibrate_camera(
 /// :param panel: the calibrated :class:`Panel`.
 /// :param camera: the file that :func:`calibrate_camera` wrote beside the profile (lab-camera.json).
 /// :param show: as in :func:`calibrate_camera`.
-/// :param photograph: as in :func:`calibrate_camera`; the exposure stays the same and overexposes little of the picture.
+/// :param photograph: as in :func:`calibrate_camera`. Expose for the picture, always alike; the zero order may be overexposed.
 /// :param room: (left, bottom, right, top) for the picture, in halves of the window that was calibrated, right and up from the axis.
 /// :param iterations: steps by the model before the first photo.
-/// :param photos: photos that are taken.
+/// :param photos: photos that are taken; the first frame's is taken twice, which tells the camera's noise.
 /// :param step: longest step of a pixel's phase by a photo [rad].
 /// :param progress: see :func:`hologram`.
 /// :return: the :class:`Frame` of the best photo. Its metadata hold the peak signal-to-noise ratios of all photos [dB]: the first is
 ///     that of the frame which the model alone found.
-/// :raises ParameterError: a photo does not show its frame.
+/// :raises ParameterError: a photo does not show its frame, is underexposed, or shows the camera's noise rather than the picture's
+///     errors.
 #[pyfunction]
 #[pyo3(signature = (
     picture, panel, camera, show, photograph, *, room = (-0.9, 0.15, 0.9, 0.9), iterations = 150, photos = 30, step = 0.05, progress = None
