@@ -78,11 +78,10 @@ const LEAST_LIKE: f64 = 0.13;
 /// bench whose photos were exposed for its zero order they ended 1.7 dB below where they began.
 const MOST_NOISE: f64 = 0.5;
 
-/// Mean of two photos of one frame; refused where these tell more of the camera's noise than of the picture's errors.
-fn mean_of_two(plane: &FarPlane, first: &[f32], second: &[f32]) -> Result<Vec<f32>> {
-    let mean: Vec<f32> = first.iter().zip(second).map(|(a, b)| 0.5 * (a + b)).collect();
+/// Refuses two photos of one frame that tell more of the camera's noise than of the picture's errors.
+fn check_noise(plane: &FarPlane, first: &[f32], second: &[f32]) -> Result<()> {
     let amplitude = |v: &f32| if v.is_nan() { f32::NAN } else { v.max(0.0).sqrt() };
-    let scale = plane.judge(&mean.iter().map(amplitude).collect::<Vec<_>>()).0;
+    let scale = plane.judge(&first.iter().map(amplitude).collect::<Vec<_>>()).0;
     let (mut noise, mut error) = (0.0, 0.0);
     for ((a, b), wanted) in first.iter().zip(second).zip(&plane.wanted) {
         let [a, b] = [a, b].map(|v| f64::from(scale * amplitude(v)));
@@ -92,7 +91,7 @@ fn mean_of_two(plane: &FarPlane, first: &[f32], second: &[f32]) -> Result<Vec<f3
         }
     }
     if noise <= MOST_NOISE * error {
-        return Ok(mean);
+        return Ok(());
     }
     let what = format!(
         "{:.0} % of what it differs from the picture by is the camera's noise, as a second photo of the same frame shows: expose for \
@@ -156,7 +155,9 @@ pub fn far_frame(
         let (field, modulated) = descent.light();
         let power: Vec<f32> = field.iter().map(|u| u.norm_sqr()).collect();
         check_likeness(&seen, &power)?;
-        let seen = if photo == 0 { mean_of_two(plane, &seen, &take()?)? } else { seen };
+        if photo == 0 {
+            check_noise(plane, &seen, &take()?)?;
+        }
         // Noise below the dark level is no light; what is not known stays so.
         let amplitude = |v: &f32| if v.is_nan() { f32::NAN } else { v.max(0.0).sqrt() };
         let amplitudes: Vec<f32> = seen.iter().map(amplitude).collect();
