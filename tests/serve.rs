@@ -572,6 +572,103 @@ mod local {
     }
 }
 
+/// The local protocol by a port: on every system.
+mod port {
+    use super::*;
+    use std::io::{BufRead, BufReader};
+    use std::path::Path;
+
+    struct Client(BufReader<TcpStream>);
+
+    impl Client {
+        /// Says the key of the file, or another.
+        fn connect(path: &Path, key: Option<&str>) -> (Self, String) {
+            let text = std::fs::read_to_string(path).expect("file");
+            let told: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+            let stream = TcpStream::connect(told["address"].as_str().expect("address")).expect("connect");
+            stream.set_read_timeout(Some(Duration::from_secs(30))).expect("timeout");
+            let mut client = Self(BufReader::new(stream));
+            let key = key.map_or_else(|| serde_json::json!({ "key": told["key"] }).to_string(), str::to_owned);
+            let greeting = client.ask(&key);
+            (client, greeting)
+        }
+
+        fn ask(&mut self, request: &str) -> String {
+            writeln!(self.0.get_mut(), "{request}").expect("request");
+            self.line()
+        }
+
+        fn line(&mut self) -> String {
+            let mut line = String::new();
+            self.0.read_line(&mut line).expect("answer");
+            line
+        }
+
+        fn show(&mut self, bytes: &[u8], kind: &str) -> serde_json::Value {
+            let ready: serde_json::Value = serde_json::from_str(&self.ask(kind)).expect("answer");
+            assert_eq!(ready["send"], bytes.len(), "{ready}");
+            self.0.get_mut().write_all(bytes).expect("array");
+            serde_json::from_str(&self.line()).expect("answer")
+        }
+    }
+
+    const LEVELS: &str = r#"{"show": "levels", "dtype": "uint8"}"#;
+
+    #[test]
+    fn arrays_follow_the_answer_that_asks_for_them_and_without_the_key_nothing_is_told() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("panel.port");
+        let settings = ServeSettings {
+            slmsuite: None,
+            slmpy: None,
+            local: Some(path.clone()),
+            connections: 8,
+            patience: Duration::from_secs(2),
+            ..ServeSettings::default()
+        };
+        let server = Server::start(panel(), &settings).expect("server");
+        assert_eq!(server.local(), Some(path.as_path()));
+        let why = Server::start(panel(), &settings).err().expect("taken").to_string();
+        assert!(why.contains("another server"), "{why}");
+        let running = Panel::run(server);
+        let (mut good, greeting) = Client::connect(&path, None);
+        assert!(greeting.contains("\"width\":32") && !greeting.contains("buffer"), "{greeting}");
+        let phases: Vec<f32> = (0..WIDTH * HEIGHT).map(|i| i as f32 * 0.01).collect();
+        let mut wanted = Vec::new();
+        let mut still = |good: &mut Client| {
+            let number = wanted.len() as u32 + 1;
+            assert_eq!(good.show(&frame(number), LEVELS)["number"], number);
+            wanted.push(levels(&frame(number)));
+        };
+        still(&mut good);
+        for key in ["", "{}", "{\"key\": \"00000000000000000000000000000000\"}", &"x".repeat(5000)] {
+            let (mut wrong, answer) = Client::connect(&path, Some(key));
+            assert!(!answer.contains("width") && wrong.line().is_empty(), "{key}: {answer}");
+            still(&mut good);
+        }
+        // What is no request is answered, and the connection goes on; half an array ends it.
+        assert!(good.ask("{\"show\": \"amplitude\", \"dtype\": \"float32\"}").contains("modulates phase"));
+        assert!(good.ask("{\"show\": \"levels\"").contains("not understood"));
+        still(&mut good);
+        let (mut half, _) = Client::connect(&path, None);
+        assert!(half.ask(LEVELS).contains("send"));
+        half.0.get_mut().write_all(&[1; 100]).expect("half");
+        assert!(half.line().is_empty(), "cut off after its patience");
+        let (mut gone, _) = Client::connect(&path, None);
+        assert!(gone.ask(LEVELS).contains("send"));
+        drop(gone);
+        still(&mut good);
+        let phase = r#"{"show": "phase", "dtype": "float32"}"#;
+        assert_eq!(good.show(bytemuck::cast_slice(&phases), phase)["number"], wanted.len() + 1);
+        drop(good);
+        let (server, shown) = running.end();
+        wanted.push(SentFrame::Values(phases));
+        assert_eq!(shown, wanted);
+        drop(server);
+        assert_eq!(std::fs::read_dir(folder.path()).expect("list").count(), 0, "something was left behind");
+    }
+}
+
 #[test]
 fn the_server_ends_at_once_whoever_is_connected() {
     let server = Server::start(panel(), &settings(Duration::from_secs(60))).expect("server");

@@ -195,8 +195,8 @@ fn settings(args: &ServeArgs, served: &ServedPanel, report: &mut Report) -> Resu
     let at = |port: u16| SocketAddr::new(args.listen, port);
     let local = match &args.local {
         Some(Some(path)) => Some(path.clone()),
-        Some(None) => serve::usual_socket(&served.name),
-        None if none => serve::usual_socket(&served.name),
+        Some(None) => Some(serve::usual_local(&served.name)),
+        None if none => Some(serve::usual_local(&served.name)),
         None => None,
     };
     if !args.listen.is_loopback() {
@@ -216,6 +216,7 @@ fn settings(args: &ServeArgs, served: &ServedPanel, report: &mut Report) -> Resu
         slmsuite: args.slmsuite.or(none.then_some(USUAL.0)).map(at),
         slmpy,
         local,
+        local_address: args.listen,
         trigger: args.trigger.map(at),
         calibrated,
         log: args.log.clone(),

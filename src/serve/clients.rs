@@ -1,7 +1,8 @@
 //! Who is connected, and what the clients' threads share.
 
+use super::local_port::PortFile;
 #[cfg(unix)]
-use super::local::LocalSocket;
+use super::local_socket::LocalSocket;
 use super::log::Log;
 use super::stream::Stream;
 use super::{FrameRequest, ServedPanel};
@@ -25,6 +26,7 @@ pub(super) struct Shared {
     pub(super) frames: SyncSender<FrameRequest>,
     #[cfg(unix)]
     pub(super) local: Option<LocalSocket>,
+    pub(super) port: Option<PortFile>,
     pub(super) connections: usize,
     pub(super) stopping: AtomicBool,
     pub(super) clients: Mutex<Vec<Arc<Client>>>,

@@ -2,8 +2,9 @@
 
 use super::clients::{CONNECTIONS, Client, FRAMES, REFUSED, Shared};
 use super::conversation::Conversation;
+use super::local_port::{self, PortFile};
 #[cfg(unix)]
-use super::local::LocalSocket;
+use super::local_socket::LocalSocket;
 use super::log::Log;
 use super::stream::Stream;
 use super::{Announcement, FrameRequest, ServeCounts, ServeSettings, ServedPanel};
@@ -32,6 +33,7 @@ enum Protocol {
     Slmsuite,
     Slmpy,
     Trigger,
+    LocalPort,
     #[cfg(unix)]
     Local,
 }
@@ -60,15 +62,18 @@ impl Server {
             let what = "no protocol is to be spoken; give slmsuite's or slmPy's a port, or a local socket";
             return Err(Error::parameter("serve", what));
         }
-        if cfg!(not(unix)) && settings.local.is_some() {
-            return Err(Error::unsupported(
-                "the local socket needs a Unix; give slmsuite's or slmPy's protocol a port instead",
-            ));
+        let by_port = settings.local.as_deref().filter(|path| local_port::is_port(path));
+        if cfg!(not(unix)) && settings.local.is_some() && by_port.is_none() {
+            return Err(Error::unsupported("a local socket needs a Unix; give --local a file that ends in .port"));
         }
         let log = settings.log.as_deref().map(Log::open).transpose()?.unwrap_or_default();
         // The socket first: whoever is refused for it must not have opened ports already.
         #[cfg(unix)]
-        let (socket, listener) = settings.local.as_deref().map(LocalSocket::take).transpose()?.unzip();
+        let socket = settings.local.as_deref().filter(|path| !local_port::is_port(path));
+        #[cfg(unix)]
+        let (socket, listener) = socket.map(LocalSocket::take).transpose()?.unzip();
+        let (port, port_listener) =
+            by_port.map(|path| PortFile::take(path, settings.local_address)).transpose()?.unzip();
         let (sender, frames) = sync_channel(1);
         let shared = Arc::new(Shared {
             panel,
@@ -80,6 +85,7 @@ impl Server {
             frames: sender,
             #[cfg(unix)]
             local: socket,
+            port,
             connections: settings.connections.max(1),
             stopping: AtomicBool::new(false),
             clients: Mutex::new(Vec::new()),
@@ -89,6 +95,9 @@ impl Server {
         server.slmsuite = settings.slmsuite.map(|address| server.listen(address, Protocol::Slmsuite)).transpose()?;
         server.slmpy = settings.slmpy.map(|address| server.listen(address, Protocol::Slmpy)).transpose()?;
         server.trigger = settings.trigger.map(|address| server.listen(address, Protocol::Trigger)).transpose()?;
+        if let Some(listener) = port_listener {
+            server.take_tcp_clients(listener, Protocol::LocalPort)?;
+        }
         #[cfg(unix)]
         if let (Some(listener), Some(path)) = (listener, server.local().map(Path::to_path_buf)) {
             let accept = move || listener.accept().map(|(stream, _)| Stream::Local(stream));
@@ -101,7 +110,11 @@ impl Server {
         let no = |error: io::Error| Error::Display {
             what: format!("cannot listen on {address}: {error}; choose another port, or end the program that has it"),
         };
-        let listener = TcpListener::bind(address).map_err(no)?;
+        self.take_tcp_clients(TcpListener::bind(address).map_err(no)?, protocol)
+    }
+
+    fn take_tcp_clients(&mut self, listener: TcpListener, protocol: Protocol) -> Result<SocketAddr> {
+        let no = |error: io::Error| Error::Display { what: format!("cannot listen: {error}") };
         let address = listener.local_addr().map_err(no)?;
         let accept = move || listener.accept().map(|(stream, _)| Stream::Tcp(stream));
         self.take_clients(Address::Tcp(address), protocol, accept);
@@ -147,16 +160,12 @@ impl Server {
         self.trigger
     }
 
-    /// The socket of the local protocol.
-    #[cfg(unix)]
+    /// The socket of the local protocol, or the file that tells its port.
     pub fn local(&self) -> Option<&Path> {
-        self.shared.local.as_ref().map(LocalSocket::socket)
-    }
-
-    /// The socket of the local protocol: there is none on this system.
-    #[cfg(not(unix))]
-    pub fn local(&self) -> Option<&Path> {
-        None
+        let port = self.shared.port.as_ref().map(PortFile::path);
+        #[cfg(unix)]
+        let port = port.or(self.shared.local.as_ref().map(LocalSocket::socket));
+        port
     }
 
     /// The next frame to show; waits for it up to `timeout`. A frame whose client was told that it waited too long is
@@ -213,6 +222,9 @@ impl Drop for Server {
                 let _ = thread.join();
             }
         }
+        if let Some(port) = &self.shared.port {
+            port.remove();
+        }
         #[cfg(unix)]
         if let Some(socket) = &self.shared.local {
             socket.remove();
@@ -221,7 +233,7 @@ impl Drop for Server {
 }
 
 /// The address by which this machine reaches a listener on `address`.
-fn reachable(mut address: SocketAddr) -> SocketAddr {
+pub(super) fn reachable(mut address: SocketAddr) -> SocketAddr {
     if address.ip().is_unspecified() {
         address.set_ip(match address {
             SocketAddr::V4(_) => std::net::Ipv4Addr::LOCALHOST.into(),
@@ -268,6 +280,7 @@ fn start_client(shared: &Arc<Shared>, stream: Stream, protocol: Protocol) {
             Protocol::Slmsuite => conversation.slmsuite(),
             Protocol::Slmpy => conversation.slmpy(),
             Protocol::Trigger => conversation.trigger(),
+            Protocol::LocalPort => conversation.local_port(),
             #[cfg(unix)]
             Protocol::Local => conversation.local(),
         };

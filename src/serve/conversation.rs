@@ -1,10 +1,6 @@
 //! One client's talk with the server: read within limits of size and time, and answered.
 
 use super::clients::{Client, FRAMES, REFUSED, Request, Shared};
-#[cfg(unix)]
-use super::local::{self, Buffer};
-#[cfg(unix)]
-use super::local_request;
 use super::slmsuite::{Command, answer, description, hardware};
 use super::stream::Stream;
 use super::task::{Done, Task};
@@ -28,7 +24,7 @@ const WHOLE_REQUEST: u32 = 6;
 
 /// One client's talk with the server.
 pub(super) struct Conversation<'a> {
-    shared: &'a Shared,
+    pub(super) shared: &'a Shared,
     client: &'a Client,
     stream: Stream,
     /// Its address and number, for the log.
@@ -51,7 +47,7 @@ impl<'a> Conversation<'a> {
     }
 
     /// The same, of a frame or another request.
-    fn told_outcome(&self, what: &str, outcome: &Result<Option<Done>, String>) {
+    pub(super) fn told_outcome(&self, what: &str, outcome: &Result<Option<Done>, String>) {
         match outcome {
             Ok(Some(Done::Played(flips))) => {
                 let last = flips.last().map_or(0, |flip| flip.number);
@@ -64,7 +60,7 @@ impl<'a> Conversation<'a> {
     }
 
     /// Counts a request that cannot be served, and writes why.
-    fn refuse(&self, what: &str, why: &str) {
+    pub(super) fn refuse(&self, what: &str, why: &str) {
         self.shared.count(REFUSED);
         self.told(what, &format!("refused: {why}"));
     }
@@ -139,57 +135,6 @@ impl<'a> Conversation<'a> {
         }
     }
 
-    /// The local protocol: a line for each frame, whose values stand in a file that both have.
-    #[cfg(unix)]
-    pub(super) fn local(&mut self) -> io::Result<()> {
-        let shared = self.shared;
-        let buffer = match Buffer::new(shared.local_folder(), &shared.panel) {
-            Ok(buffer) => buffer,
-            Err(error) => return self.reply(local::refusal(&error.to_string()).as_bytes()),
-        };
-        self.reply(local::greeting(&shared.panel, &buffer).as_bytes())?;
-        loop {
-            let mut first = [0];
-            self.stream.set_read_timeout(None)?;
-            self.stream.read_exact(&mut first)?;
-            let arrived = Instant::now();
-            let line = match self.line(local_request::LINE_LIMIT, Some(first[0])) {
-                Ok(line) => line,
-                Err(error) => {
-                    self.refuse("local", &error.to_string());
-                    let _ = self.reply(local::refusal(&error.to_string()).as_bytes());
-                    return Err(error);
-                }
-            };
-            self.release();
-            let asked = local_request::read(&line).and_then(|command| match command {
-                local_request::Command::Mapped => {
-                    buffer.unlink();
-                    Ok(None)
-                }
-                local_request::Command::Array(task, array) => {
-                    let frame = self
-                        .wait_for_room(buffer.bytes(), buffer.bytes())
-                        .and_then(|()| buffer.take(array, &shared.panel));
-                    self.release();
-                    frame.map(|frame| Some((task, frame)))
-                }
-                local_request::Command::Other(task) => Ok(Some((task, SentFrame::default()))),
-            });
-            let outcome = asked.inspect_err(|_| _ = self.shared.count(REFUSED)).and_then(|asked| match asked {
-                None => Ok(None),
-                Some((task, frame)) => self.ask(task, frame).map(Some),
-            });
-            self.told_outcome("local", &outcome);
-            let answer = match outcome {
-                Ok(None) => local::done(),
-                Ok(Some(done)) => local::answer(&done, arrived),
-                Err(why) => local::refusal(&why),
-            };
-            self.reply(answer.as_bytes())?;
-        }
-    }
-
     /// Lines of text, each of which shows a frame that is kept ready.
     pub(super) fn trigger(&mut self) -> io::Result<()> {
         // Whose the frame is that a trigger shows, it does not say.
@@ -226,7 +171,7 @@ impl<'a> Conversation<'a> {
     }
 
     /// Hands a task on and waits until it is done, and the panel has settled where that was asked for.
-    fn ask(&mut self, task: Task, frame: SentFrame) -> Result<Done, String> {
+    pub(super) fn ask(&mut self, task: Task, frame: SentFrame) -> Result<Done, String> {
         self.client.answering.store(true, Ordering::SeqCst);
         let (answer, shown) = sync_channel(1);
         if matches!(task, Task::Show | Task::Recall(_) | Task::Next | Task::Play { .. }) {
@@ -280,7 +225,7 @@ impl<'a> Conversation<'a> {
         }
     }
 
-    fn reply(&mut self, bytes: &[u8]) -> io::Result<()> {
+    pub(super) fn reply(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.stream.write_all(bytes)?;
         self.stream.flush()
     }
@@ -288,7 +233,7 @@ impl<'a> Conversation<'a> {
     /// Reads up to the first line feed, which is left out. `first`: a byte of it that was read already.
     ///
     /// What has come behind the line feed is lost: clients wait for the answer before they send more.
-    fn line(&mut self, limit: usize, first: Option<u8>) -> io::Result<Vec<u8>> {
+    pub(super) fn line(&mut self, limit: usize, first: Option<u8>) -> io::Result<Vec<u8>> {
         let start = Instant::now();
         let (mut line, mut chunk) = (Vec::new(), vec![0; CHUNK.min(limit)]);
         match first {
@@ -317,8 +262,14 @@ impl<'a> Conversation<'a> {
         }
     }
 
+    /// The first byte of a request: between requests a client may be silent for as long as it likes.
+    pub(super) fn wait_for_first(&mut self, first: &mut [u8; 1]) -> io::Result<()> {
+        self.stream.set_read_timeout(None)?;
+        self.stream.read_exact(first)
+    }
+
     /// Fills `buffer` whole.
-    fn whole(&mut self, buffer: &mut [u8], start: Instant) -> io::Result<()> {
+    pub(super) fn whole(&mut self, buffer: &mut [u8], start: Instant) -> io::Result<()> {
         let mut filled = 0;
         while filled < buffer.len() {
             filled += self.some(&mut buffer[filled..], start)?;
@@ -372,7 +323,7 @@ impl<'a> Conversation<'a> {
 
     /// Takes room for `bytes` as soon as there is some: who has long held much of a request and sends no more is cut off for
     /// it.
-    fn wait_for_room(&mut self, bytes: usize, limit: usize) -> Result<(), String> {
+    pub(super) fn wait_for_room(&mut self, bytes: usize, limit: usize) -> Result<(), String> {
         let start = Instant::now();
         while !self.hold(bytes, limit) {
             if start.elapsed() > self.shared.patience {
@@ -388,7 +339,7 @@ impl<'a> Conversation<'a> {
         Ok(())
     }
 
-    fn release(&mut self) {
+    pub(super) fn release(&mut self) {
         let held = std::mem::take(&mut self.held);
         let beyond = held.saturating_sub(slmpy::plain_limit(&self.shared.panel));
         self.shared.queues[usize::from(self.client.is_local)].give_back(self.client.number, beyond);

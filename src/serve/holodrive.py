@@ -31,6 +31,8 @@ import json
 import mmap
 import os
 import socket
+import sys
+import tempfile
 import threading
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, BinaryIO, Iterable, List, NamedTuple, Optional, Tuple, Type, Union
@@ -54,7 +56,7 @@ else:
 class Shown(NamedTuple):
     """When and how a frame came on the panel."""
 
-    #: Of the flip [s], on the clock of ``time.monotonic()``.
+    #: Of the flip [s], on the clock of ``time.monotonic()``; NaN where programs have no clock in common (Windows, macOS).
     time: float
     #: Running number of the frame on this panel.
     number: int
@@ -69,27 +71,63 @@ _MOST_PLAYED = 32768
 
 
 def _folder() -> str:
+    if sys.platform == "win32":
+        return os.path.join(os.environ.get("LOCALAPPDATA") or tempfile.gettempdir(), "holodrive")
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     return os.path.join(runtime, "holodrive") if os.path.isabs(runtime) else "/tmp/holodrive-%d" % os.geteuid()
 
 
+#: Of sockets, and of files that tell a port.
+_ENDINGS = (".sock", ".port")
+
+
 def _find(name: Optional[str]) -> str:
     if name is not None:
-        return os.path.join(_folder(), name + ".sock")
-    found = sorted(glob.glob(os.path.join(_folder(), "*.sock")))
+        paths = [os.path.join(_folder(), name + ending) for ending in _ENDINGS]
+        return next((path for path in paths if os.path.exists(path)), paths[sys.platform == "win32"])
+    found = sorted(path for ending in _ENDINGS for path in glob.glob(os.path.join(_folder(), "*" + ending)))
     if len(found) == 1:
         return found[0]
     if not found:
         raise Error("no panel is served; start one with: holodrive serve --panel PROFILE --monitor NAME")
-    names = ", ".join(os.path.basename(path)[: -len(".sock")] for path in found)
+    names = ", ".join(os.path.splitext(os.path.basename(path))[0] for path in found)
     raise Error("more than one panel is served; name one of: " + names)
 
 
+def _connect(path: str, timeout: float) -> "Tuple[socket.socket, Optional[bytes]]":
+    """The connection, and what to say first: the key, where the way is a port."""
+    if path.endswith(".port"):
+        with open(path, encoding="utf-8") as file:
+            told = json.loads(file.read(4096))
+        host, _, port = str(told["address"]).rpartition(":")
+        host = host.strip("[]")
+        # A server that listens everywhere is reached here.
+        here = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+        stream = socket.create_connection((here.get(host, host), int(port)), timeout)
+        stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return stream, json.dumps({"key": told["key"]}).encode() + b"\n"
+    if sys.platform == "win32":
+        raise OSError("there are no such sockets on Windows; give serve a --local FILE.port")
+    stream = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        stream.settimeout(timeout)
+        stream.connect(path)
+    except BaseException:
+        stream.close()
+        raise
+    return stream, None
+
+
+def _time(told: Optional[float]) -> float:
+    return float("nan") if told is None else told
+
+
 class SLM:
-    """A panel that ``holodrive serve`` keeps on this machine. Several threads may use one: their frames are shown one after another.
+    """A panel that ``holodrive serve`` keeps. Several threads may use one: their frames are shown one after another.
 
     :param name: the panel's name (``--name``, else its profile's); may be left out where one panel is served.
-    :param path: its socket, where ``--local`` put it elsewhere.
+    :param path: its socket or port's file, where ``--local`` put it elsewhere. A copy of a port's file, with its address changed to
+        the server's, is the way from another machine.
     :param timeout: longest wait for an answer [s].
 
     Attributes: ``name``; ``shape`` as ``(rows, columns)``; ``bits`` of a level; ``modulation``, "phase" or "amplitude";
@@ -115,17 +153,18 @@ class SLM:
         self._timeout = timeout
         self._map: Optional[mmap.mmap] = None
         self._lines: Optional[BinaryIO] = None
-        # The array lies in memory that is shared with the program, and an answer is that of the request before it: one at a time.
+        # An answer is that of the request before it, and the array may lie in memory that is shared with the program: one at a time.
         self._turn = threading.RLock()
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._socket: Optional[socket.socket] = None
         try:
-            self._socket.settimeout(timeout)
             path = _find(name) if path is None else os.fspath(path)
             try:
-                self._socket.connect(path)
-            except OSError as error:
+                self._socket, key = _connect(path, timeout)
+            except (OSError, ValueError, KeyError, TypeError) as error:
                 raise Error("no panel is served at %s: %s" % (path, error)) from error
             self._lines = self._socket.makefile("rb")
+            if key is not None:
+                self._socket.sendall(key)
             about = self._answer()
             if about.get("protocol") != 1:
                 raise Error("this module speaks version 1 of the protocol, the program %s" % about.get("protocol"))
@@ -137,9 +176,10 @@ class SLM:
             self.wavelength = about["wavelength"]
             self.settle_time = about["settle_time"]
             self.curve = np.array(about["curve"], np.float64) if "curve" in about else None
-            with open(about["buffer"], "r+b") as file:
-                self._map = mmap.mmap(file.fileno(), about["bytes"])
-            self._ask({"mapped": True})
+            if "buffer" in about:
+                with open(about["buffer"], "r+b") as file:
+                    self._map = mmap.mmap(file.fileno(), about["bytes"])
+                self._ask({"mapped": True})
         except BaseException:
             self.close()
             raise
@@ -184,7 +224,7 @@ class SLM:
         request = {"play": asked} if rate is None else {"play": asked, "rate": float(rate)}
         lasts = len(asked) * (0.1 if rate is None else 1 / max(float(rate), 1e-3))
         answer = self._ask(request, lasts)
-        times, first = answer["times"], answer["first"]
+        times, first = [_time(time) for time in answer["times"]], answer["first"]
         due = times[0]
         shown = []
         for k, (time, missed) in enumerate(zip(times, answer["missed"])):
@@ -208,7 +248,7 @@ class SLM:
         return int(self._ask({"forget": [str(name) for name in names]})["kept"])
 
     def _shown(self, answer: dict[str, Any]) -> Shown:
-        return Shown(answer["time"], answer["number"], answer["missed"], answer["latency"])
+        return Shown(_time(answer["time"]), answer["number"], answer["missed"], answer["latency"])
 
     def _send(self, array: Any, request: dict[str, Any]) -> dict[str, Any]:
         """Puts an array into the shared memory and asks for what is to be done with it."""
@@ -227,10 +267,16 @@ class SLM:
             raise ValueError("the array is of %s; give phases (float) or levels (integer)" % array.dtype)
         with self._turn:
             # It may have been closed while another thread had its turn.
-            if self._map is None:
+            if self._closed():
                 raise Error("this SLM is closed")
-            np.ndarray(self.shape, dtype, self._map)[...] = array
-            return self._ask({"show": kind, "dtype": dtype, **request})
+            request = {"show": kind, "dtype": dtype, **request}
+            if self._map is not None:
+                np.ndarray(self.shape, dtype, self._map)[...] = array
+                return self._ask(request)
+            # Through the port: when the program is ready to take it.
+            self._ask(request)
+            self._say(np.ascontiguousarray(array, np.dtype(dtype).newbyteorder("<")).tobytes())
+            return self._answer()
 
     async def show_async(self, array: Union[ArrayLike, str, int]) -> Shown:
         """The same for ``await``: the event loop goes on while the frame comes on the panel."""
@@ -241,7 +287,8 @@ class SLM:
         with self._turn:
             if self._lines is not None:
                 self._lines.close()
-            self._socket.close()
+            if self._socket is not None:
+                self._socket.close()
             if self._map is not None:
                 shared, self._map = self._map, None
                 shared.close()
@@ -258,22 +305,33 @@ class SLM:
         self.close()
 
     def __repr__(self) -> str:
-        if self._map is None:
+        if self._closed():
             return "<holodrive.SLM, closed>"
         rows, columns = self.shape
         return "<holodrive.SLM %s, %d × %d px of %d bits>" % (self.name, columns, rows, self.bits)
 
     def _ask(self, request: dict[str, Any], lasts: float = 0.0) -> dict[str, Any]:
         with self._turn:
-            if self._lines is None or self._lines.closed:
+            if self._closed():
                 raise Error("this SLM is closed")
-            try:
-                self._socket.settimeout(self._timeout + lasts)
-                self._socket.sendall(json.dumps(request).encode() + b"\n")
-            except OSError as error:
-                self.close()
-                raise Error("the program has ended: %s" % error) from error
+            self._say(json.dumps(request).encode() + b"\n", lasts)
             return self._answer()
+
+    def _closed(self) -> bool:
+        return self._socket is None or self._lines is None or self._lines.closed
+
+    def _say(self, said: bytes, lasts: float = 0.0) -> None:
+        assert self._socket is not None
+        try:
+            self._socket.settimeout(self._timeout + lasts)
+            self._socket.sendall(said)
+        except OSError as error:
+            self.close()
+            raise Error("the program has ended: %s" % error) from error
+        except BaseException:
+            # Ctrl-C half way: what follows would be taken for the rest of it.
+            self.close()
+            raise
 
     def _answer(self) -> dict[str, Any]:
         assert self._lines is not None

@@ -21,9 +21,17 @@
 //! no array; `{"forget": ["NAME", …]}` gives up some, or all. Phases and amplitudes go
 //! through the panel's correction and level curve here; levels are final.
 //!
+//! # By a port
+//!
+//! Where there are no such sockets (Windows), or at another machine, the same is spoken over TCP. The server writes where, and a
+//! key, into a file that its user alone may read (`NAME.port`); the client's first line is `{"key": "…"}`, and without it
+//! nothing is told. There is no common memory then: the greeting has no `buffer`, a request with an array is answered with
+//! `{"send": BYTES}`, upon which the client sends the array's bytes, little-endian.
+//!
 //! # Why it is made so
 //!
-//! A file-system socket is the user's own by its permissions; a port of loopback is everybody's on the machine. The array
+//! A file-system socket is the user's own by its permissions; a port of loopback is everybody's on the machine, so that one needs a
+//! key. The array
 //! crosses in shared memory, so that neither side copies it through a socket in pieces. The server *reads* the file and
 //! never maps it: a client that cuts the file short would end a process that has it mapped (SIGBUS), but only
 //! shortens a read. The server makes the file, because a path that a client names could be any file that the server may read,
@@ -34,177 +42,67 @@ use super::clock::monotonic_seconds;
 use super::local_request::{ArrayType, Dtype, Quantity};
 use super::task::Done;
 use super::{SentFrame, ServedPanel};
-use crate::error::{Error, Result};
 use crate::panel::Modulation;
 use rayon::prelude::*;
-use rustix::process::geteuid;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
-use std::fs::{self, DirBuilder, File, OpenOptions};
-use std::io;
-use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt, PermissionsExt};
-use std::os::unix::net::{UnixListener, UnixStream};
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::path::Path;
 use std::time::Instant;
 
 /// Version of the protocol.
 const VERSION: u32 = 1;
 /// Bytes of a pixel in the widest type that is taken.
-const WIDEST: usize = 8;
+pub(super) const WIDEST: usize = 8;
 
-/// Numbers buffers, so that two connections do not share one.
-static BUFFERS: AtomicU64 = AtomicU64::new(0);
+/// Where the bytes of a client's array come from.
+pub(super) trait Source {
+    /// Fills `bytes`; the error is an answer to the client.
+    fn read(&mut self, bytes: &mut [u8]) -> Result<(), String>;
+}
 
-/// The folder in which servers of this user have their sockets: `$XDG_RUNTIME_DIR/holodrive`, or a folder of the user's
-/// own among the temporary files.
-pub(super) fn runtime_folder() -> PathBuf {
-    match std::env::var_os("XDG_RUNTIME_DIR").filter(|folder| Path::new(folder).is_absolute()) {
-        Some(folder) => Path::new(&folder).join("holodrive"),
-        None => PathBuf::from(format!("/tmp/holodrive-{}", geteuid().as_raw())),
+/// Whether a panel can show such an array at all.
+pub(super) fn check(array: ArrayType, panel: &ServedPanel) -> Result<(), String> {
+    let wrong = |wants: &str, has: &str| Err(format!("The panel modulates {has}; it cannot show {wants}."));
+    match (array.quantity, panel.modulation) {
+        (Quantity::Phase, Modulation::Amplitude) => wrong("phase", "amplitude"),
+        (Quantity::Amplitude, Modulation::Phase) => wrong("amplitude", "phase"),
+        _ => Ok(()),
     }
 }
 
-/// A socket that is ours, and the folder that it is in.
-pub(super) struct LocalSocket {
-    socket: PathBuf,
-    folder: PathBuf,
-}
-
-impl LocalSocket {
-    /// Makes the folder, where it is not there, and the socket in it.
-    ///
-    /// # Errors
-    /// [`Error::Display`] when another server has the socket, or the folder belongs to somebody else; [`Error::Io`].
-    pub(super) fn take(socket: &Path) -> Result<(Self, UnixListener)> {
-        let folder = match socket.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder.to_path_buf(),
-            _ => PathBuf::from("."),
-        };
-        if !folder.exists() {
-            DirBuilder::new().mode(0o700).create(&folder).map_err(Error::io(&folder))?;
+/// Copies a frame out of an array.
+pub(super) fn take(array: ArrayType, panel: &ServedPanel, source: &mut impl Source) -> Result<SentFrame, String> {
+    check(array, panel)?;
+    let pixels = panel.pixels();
+    Ok(match array.dtype {
+        Dtype::Uint8 => panel.take(read::<u8>(source, pixels)?.into_iter().map(u16::from).collect())?,
+        Dtype::Uint16 => panel.take(read(source, pixels)?)?,
+        Dtype::Float32 => SentFrame::Values(read(source, pixels)?),
+        Dtype::Float64 => {
+            // A phase of many turns is brought to one before it loses its last digits.
+            let turn = |v: f64| (v - TAU * (v / TAU).floor()) as f32;
+            let values_read: Vec<f64> = read(source, pixels)?;
+            SentFrame::Values(match array.quantity {
+                Quantity::Phase => values_read.into_par_iter().map(turn).collect(),
+                _ => values_read.into_iter().map(|v| v as f32).collect(),
+            })
         }
-        // In a folder that others may write in, they could put a socket of theirs in the place of ours.
-        let private = folder == runtime_folder();
-        let about = if private { fs::symlink_metadata(&folder) } else { fs::metadata(&folder) };
-        let about = about.map_err(Error::io(&folder))?;
-        let own = about.uid() == geteuid().as_raw() || (!private && about.uid() == 0);
-        if !about.is_dir() || !own || about.mode() & 0o022 != 0 {
-            let hint = if private { "remove it" } else { "take one that is yours" };
-            let what = format!("{} is not a folder that only you can write in; {hint}", folder.display());
-            return Err(Error::Display { what });
-        }
-        if fs::symlink_metadata(socket).is_ok() {
-            if UnixStream::connect(socket).is_ok() {
-                let socket = socket.display();
-                let what =
-                    format!("{socket} is another server's; end that one, or give this one another name or socket");
-                return Err(Error::Display { what });
-            }
-            // Left behind by a server that was killed. Anything but a socket is somebody's file.
-            use std::os::unix::fs::FileTypeExt;
-            if !fs::symlink_metadata(socket).is_ok_and(|about| about.file_type().is_socket()) {
-                return Err(Error::Display { what: format!("{} is a file, not a socket", socket.display()) });
-            }
-            fs::remove_file(socket).map_err(Error::io(socket))?;
-        }
-        let listener = UnixListener::bind(socket).map_err(Error::io(socket))?;
-        fs::set_permissions(socket, fs::Permissions::from_mode(0o600)).map_err(Error::io(socket))?;
-        Ok((Self { socket: socket.to_path_buf(), folder }, listener))
-    }
-
-    pub(super) fn socket(&self) -> &Path {
-        &self.socket
-    }
-
-    pub(super) fn folder(&self) -> &Path {
-        &self.folder
-    }
-
-    /// Removes the socket.
-    pub(super) fn remove(&self) {
-        // One that is gone already is no loss.
-        let _ = fs::remove_file(&self.socket);
-    }
+    })
 }
 
-/// The memory that one client shares with the server.
-pub(super) struct Buffer {
-    file: File,
-    path: PathBuf,
-    bytes: usize,
-}
-
-impl Buffer {
-    /// A new one in `folder`, for one frame of `panel`; it takes no memory until it is written.
-    pub(super) fn new(folder: &Path, panel: &ServedPanel) -> io::Result<Self> {
-        let number = BUFFERS.fetch_add(1, Ordering::Relaxed);
-        // Clients in another folder must find it, too.
-        let folder = fs::canonicalize(folder)?;
-        let path = folder.join(format!(".frame-{}-{number}", std::process::id()));
-        let file = OpenOptions::new().read(true).write(true).create_new(true).mode(0o600).open(&path)?;
-        let bytes = WIDEST * panel.pixels();
-        let buffer = Self { file, path, bytes };
-        buffer.file.set_len(bytes as u64)?;
-        Ok(buffer)
-    }
-
-    /// Its length [bytes].
-    pub(super) fn bytes(&self) -> usize {
-        self.bytes
-    }
-
-    /// Removes its name: nothing is left behind, however server and client end.
-    pub(super) fn unlink(&self) {
-        let _ = fs::remove_file(&self.path);
-    }
-
-    /// Copies a frame out of it.
-    pub(super) fn take(&self, array: ArrayType, panel: &ServedPanel) -> Result<SentFrame, String> {
-        let pixels = panel.pixels();
-        let wrong = |wants: &str, has: &str| Err(format!("The panel modulates {has}; it cannot show {wants}."));
-        match (array.quantity, panel.modulation) {
-            (Quantity::Phase, Modulation::Amplitude) => return wrong("phase", "amplitude"),
-            (Quantity::Amplitude, Modulation::Phase) => return wrong("amplitude", "phase"),
-            _ => {}
-        }
-        Ok(match array.dtype {
-            Dtype::Uint8 => panel.take(self.read::<u8>(pixels)?.into_iter().map(u16::from).collect())?,
-            Dtype::Uint16 => panel.take(self.read(pixels)?)?,
-            Dtype::Float32 => SentFrame::Values(self.read(pixels)?),
-            Dtype::Float64 => {
-                // A phase of many turns is brought to one before it loses its last digits.
-                let turn = |v: f64| (v - TAU * (v / TAU).floor()) as f32;
-                let values_read: Vec<f64> = self.read(pixels)?;
-                SentFrame::Values(match array.quantity {
-                    Quantity::Phase => values_read.into_par_iter().map(turn).collect(),
-                    _ => values_read.into_iter().map(|v| v as f32).collect(),
-                })
-            }
-        })
-    }
-
-    fn read<T: bytemuck::Pod>(&self, count: usize) -> Result<Vec<T>, String> {
-        let mut values = crate::field::zeroed(count);
-        let read = self.file.read_exact_at(bytemuck::cast_slice_mut(&mut values), 0);
-        read.map_err(|error| format!("The shared file cannot be read: {error}."))?;
-        Ok(values)
-    }
-}
-
-impl Drop for Buffer {
-    fn drop(&mut self) {
-        self.unlink();
-    }
+fn read<T: bytemuck::Pod>(source: &mut impl Source, count: usize) -> Result<Vec<T>, String> {
+    let mut values = crate::field::zeroed(count);
+    source.read(bytemuck::cast_slice_mut(&mut values))?;
+    Ok(values)
 }
 
 fn line(value: &Value) -> String {
     value.to_string() + "\n"
 }
 
-/// The first line to a client.
-pub(super) fn greeting(panel: &ServedPanel, buffer: &Buffer) -> String {
-    line(&json!({
+/// The first line to a client. `buffer`: the file that its arrays are to stand in, and its length; none: they are sent.
+pub(super) fn greeting(panel: &ServedPanel, buffer: Option<(&Path, usize)>) -> String {
+    let mut about = json!({
         "holodrive": env!("CARGO_PKG_VERSION"),
         "protocol": VERSION,
         "name": panel.name,
@@ -220,9 +118,17 @@ pub(super) fn greeting(panel: &ServedPanel, buffer: &Buffer) -> String {
         "settle_time": panel.settle_time,
         // Seven decimals: a curve of 16 bits stays within the megabyte that clients read as a line.
         "curve": panel.curve.iter().map(|value| (value * 1e7).round() / 1e7).collect::<Vec<_>>(),
-        "buffer": buffer.path.to_string_lossy(),
-        "bytes": buffer.bytes,
-    }))
+    });
+    if let Some((path, bytes)) = buffer {
+        about["buffer"] = path.to_string_lossy().into();
+        about["bytes"] = bytes.into();
+    }
+    line(&about)
+}
+
+/// The answer to a request whose array is to be sent now.
+pub(super) fn send(bytes: usize) -> String {
+    line(&json!({ "send": bytes }))
 }
 
 /// The answer to a request that has nothing to tell.
@@ -255,94 +161,4 @@ pub(super) fn answer(done: &Done, arrived: Instant) -> String {
 /// The answer to a request that was refused.
 pub(super) fn refusal(why: &str) -> String {
     line(&json!({ "error": why }))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn panel(modulation: Modulation) -> ServedPanel {
-        ServedPanel {
-            name: "panel".into(),
-            width: 5,
-            height: 3,
-            bits: 10,
-            modulation,
-            pixel_pitch: [8e-6, 8e-6],
-            wavelength: 532e-9,
-            design_wavelength: 633e-9,
-            settle_time: 0.05,
-            curve: vec![0.0, 0.5],
-        }
-    }
-
-    fn array(quantity: Quantity, dtype: Dtype) -> ArrayType {
-        ArrayType { quantity, dtype }
-    }
-
-    #[test]
-    fn each_type_is_read_as_it_was_written() {
-        let folder = tempfile::tempdir().expect("folder");
-        let panel = panel(Modulation::Phase);
-        let buffer = Buffer::new(folder.path(), &panel).expect("buffer");
-        let levels: Vec<u16> = (0..15).map(|i| i * 73).collect();
-        buffer.file.write_all_at(bytemuck::cast_slice(&levels), 0).expect("write");
-        assert_eq!(buffer.take(array(Quantity::Levels, Dtype::Uint16), &panel), Ok(SentFrame::Levels(levels)));
-        let phases: Vec<f64> = (0..15).map(|i| 0.1 + f64::from(i) + 1e6 * TAU * f64::from(i - 7)).collect();
-        buffer.file.write_all_at(bytemuck::cast_slice(&phases), 0).expect("write");
-        let Ok(SentFrame::Values(read)) = buffer.take(array(Quantity::Phase, Dtype::Float64), &panel) else {
-            panic!("not read");
-        };
-        for (i, value) in read.iter().enumerate() {
-            let wanted = (0.1 + i as f64).rem_euclid(TAU);
-            // Seven million turns cost 8 digits of 16.
-            assert!((f64::from(*value) - wanted).abs() < 1e-6, "{i}: {value} {wanted}");
-        }
-        let narrow: Vec<f32> = phases.iter().map(|v| *v as f32).collect();
-        buffer.file.write_all_at(bytemuck::cast_slice(&narrow), 0).expect("write");
-        assert_eq!(buffer.take(array(Quantity::Phase, Dtype::Float32), &panel), Ok(SentFrame::Values(narrow)));
-        let bytes: Vec<u8> = (200..215).collect();
-        buffer.file.write_all_at(&bytes, 0).expect("write");
-        let wanted = bytes.into_iter().map(u16::from).collect();
-        assert_eq!(buffer.take(array(Quantity::Levels, Dtype::Uint8), &panel), Ok(SentFrame::Levels(wanted)));
-    }
-
-    #[test]
-    fn a_file_cut_short_or_levels_too_high_are_refused() {
-        let folder = tempfile::tempdir().expect("folder");
-        let phase = panel(Modulation::Phase);
-        let buffer = Buffer::new(folder.path(), &phase).expect("buffer");
-        buffer.file.write_all_at(&[0xFF; 30], 0).expect("write");
-        let why = buffer.take(array(Quantity::Levels, Dtype::Uint16), &phase).expect_err("levels of 16 bits");
-        assert!(why.contains("1023"), "{why}");
-        let why = buffer.take(array(Quantity::Amplitude, Dtype::Float32), &phase).expect_err("a phase panel");
-        assert!(why.contains("modulates phase"), "{why}");
-        let why = buffer.take(array(Quantity::Phase, Dtype::Float32), &panel(Modulation::Amplitude));
-        assert!(why.expect_err("an amplitude panel").contains("modulates amplitude"));
-        buffer.file.set_len(59).expect("cut");
-        let why = buffer.take(array(Quantity::Phase, Dtype::Float32), &phase).expect_err("15 values of 4 bytes");
-        assert!(why.contains("shared file"), "{why}");
-        drop(buffer);
-        assert_eq!(fs::read_dir(folder.path()).expect("list").count(), 0);
-    }
-
-    #[test]
-    fn a_socket_is_taken_once_and_a_dead_ones_is_taken_over() {
-        let folder = tempfile::tempdir().expect("folder");
-        let path = folder.path().join("own").join("panel.sock");
-        let (place, listener) = LocalSocket::take(&path).expect("socket");
-        let about = fs::metadata(&path).expect("socket");
-        assert_eq!(about.mode() & 0o777, 0o600);
-        assert_eq!(fs::metadata(place.folder()).expect("folder").mode() & 0o777, 0o700);
-        let why = LocalSocket::take(&path).err().expect("taken").to_string();
-        assert!(why.contains("another server"), "{why}");
-        // As a killed server leaves it.
-        drop(listener);
-        let (place, _listener) = LocalSocket::take(&path).expect("taken over");
-        place.remove();
-        assert!(!path.exists());
-        fs::write(&path, "a file").expect("write");
-        assert!(LocalSocket::take(&path).is_err());
-        assert!(path.exists(), "somebody's file was removed");
-    }
 }

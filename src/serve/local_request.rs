@@ -23,6 +23,18 @@ pub(super) enum Dtype {
     Float64,
 }
 
+impl Dtype {
+    /// Bytes of a pixel.
+    pub(super) fn bytes(self) -> usize {
+        match self {
+            Self::Uint8 => 1,
+            Self::Uint16 => 2,
+            Self::Float32 => 4,
+            Self::Float64 => 8,
+        }
+    }
+}
+
 /// What the array in the buffer is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct ArrayType {

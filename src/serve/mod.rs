@@ -48,10 +48,12 @@ mod clock;
 mod connections;
 mod conversation;
 mod keeping;
-#[cfg(unix)]
 mod local;
-#[cfg(unix)]
+mod local_port;
 mod local_request;
+#[cfg(unix)]
+mod local_socket;
+mod local_talk;
 mod log;
 mod output;
 mod playing;
@@ -105,16 +107,13 @@ pub struct ServedPanel {
     pub curve: Vec<f64>,
 }
 
-/// The socket of the local protocol on which clients look for the panel of that name; none where the system has no such
-/// sockets.
-pub fn usual_socket(name: &str) -> Option<PathBuf> {
+/// Where clients look for the panel of that name by the local protocol: a socket, or where the system has no such sockets a file
+/// that tells a port and its key.
+pub fn usual_local(name: &str) -> PathBuf {
     #[cfg(unix)]
-    return Some(local::runtime_folder().join(format!("{name}.sock")));
+    return local_socket::runtime_folder().join(format!("{name}.sock"));
     #[cfg(not(unix))]
-    {
-        let _ = name;
-        None
-    }
+    local_port::runtime_folder().join(format!("{name}.{}", local_port::ENDING))
 }
 
 /// A frame as a client sent it: of the panel's size, row-major, row 0 on top.
@@ -133,8 +132,10 @@ pub struct ServeSettings {
     pub slmsuite: Option<SocketAddr>,
     /// Address for slmPy's protocol, if it is to be spoken. Port 0: a free one.
     pub slmpy: Option<SocketAddr>,
-    /// Socket for the local protocol, if it is to be spoken.
+    /// Socket for the local protocol, if it is to be spoken; a path that ends in `.port` is a file for where its port is.
     pub local: Option<PathBuf>,
+    /// Address of such a port.
+    pub local_address: IpAddr,
     /// Address for triggers, if they are to be heard: a line of text shows the next frame of the armed list, or the one of
     /// that name. Port 0: a free one.
     pub trigger: Option<SocketAddr>,
@@ -158,6 +159,7 @@ impl Default for ServeSettings {
             slmsuite: loopback(5025),
             slmpy: loopback(9999),
             local: None,
+            local_address: IpAddr::V4(Ipv4Addr::LOCALHOST),
             trigger: None,
             calibrated: false,
             settle: Duration::ZERO,
@@ -186,7 +188,7 @@ pub struct Announcement {
     pub slmsuite: Option<SocketAddr>,
     /// Address of slmPy's protocol.
     pub slmpy: Option<SocketAddr>,
-    /// Socket of the local protocol.
+    /// Socket of the local protocol, or the file that tells its port.
     pub local: Option<PathBuf>,
     /// Address of triggers.
     pub trigger: Option<SocketAddr>,

@@ -37,15 +37,18 @@ def room() -> hd.Scene:
     return hd.Scene.load(ROOT / "scenes" / "cornell.gltf")
 
 
-@pytest.fixture
-def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> "Iterator[hd.Served]":
+@pytest.fixture(params=["socket", "port"])
+def served(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> "Iterator[hd.Served]":
+    """A panel of 320 × 200 pixels by either way of the local protocol."""
     if sys.platform == "win32":
-        pytest.skip("the local protocol is Unix's")
+        pytest.skip("the tests tell times by a clock that programs have in common")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     profile = (ROOT / "calib" / "generic.toml").read_text()
     profile = profile.replace("width = 1920", "width = 320").replace("height = 1080", "height = 200")
     (tmp_path / "small.toml").write_text(profile)
-    arguments = ("--local", "--trigger", "0")
+    (tmp_path / "holodrive").mkdir(mode=0o700)
+    way = ("--local", str(tmp_path / "holodrive" / "bench.port")) if request.param == "port" else ("--local",)
+    arguments = (*way, "--trigger", "0")
     with hd.serve(tmp_path / "small.toml", name="bench", output=tmp_path / "frames", arguments=arguments) as running:
         yield running
 

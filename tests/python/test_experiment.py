@@ -17,7 +17,7 @@ import pytest
 from conftest import ROOT
 from numpy.typing import NDArray
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the local protocol is Unix's")
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the tests tell times by a clock that programs have in common")
 
 
 def flat(slm: hd.SLM, level: int) -> "NDArray[np.uint8]":
@@ -101,6 +101,29 @@ def test_a_line_on_the_trigger_port_shows_the_next_frame(served: hd.Served, tmp_
     assert shown_levels(tmp_path / "frames") == [52, 50, 50, 51, 52, 50, 51, 52]
 
 
+def test_a_port_is_opened_by_its_file_only(plain: "Callable[..., hd.Served]", tmp_path: Path) -> None:
+    path = tmp_path / "own" / "bench.port"
+    with hd.serve(tmp_path / "small.toml", name="bench", arguments=("--local", str(path))) as served:
+        assert path.stat().st_mode & 0o777 == 0o600
+        told = json.loads(path.read_text())
+        assert told["address"].startswith("127.0.0.1:")
+        wrong = tmp_path / "wrong.port"
+        wrong.write_text(json.dumps({**told, "key": told["key"][::-1]}))
+        with pytest.raises(hd.DisplayError, match="key"):
+            hd.SLM(path=wrong)
+        for text in ("", "{}", "[]", '{"address": "nowhere", "key": ""}'):
+            wrong.write_text(text)
+            with pytest.raises(hd.DisplayError, match="no panel is served"):
+                hd.SLM(path=wrong)
+        with hd.SLM(path=path) as slm:
+            assert slm.show(flat(slm, 9)).number == 1
+            with pytest.raises(hd.DisplayError, match="cannot show"):
+                slm._ask({"show": "amplitude", "dtype": "float32"})
+            assert slm.show(np.zeros(slm.shape)).number == 2
+        served.stop()
+    assert not path.exists()
+
+
 def test_a_play_ends_when_its_client_goes(served: hd.Served) -> None:
     leaving, staying = served.slm(timeout=5), served.slm(timeout=5)
     for k in range(2):
@@ -117,6 +140,7 @@ def test_a_play_ends_when_its_client_goes(served: hd.Served) -> None:
     playing.start()
     time.sleep(0.5)
     # As a process that is killed: its end of the connection goes.
+    assert leaving._socket is not None
     leaving._socket.shutdown(socket.SHUT_RDWR)
     playing.join(5)
     assert not playing.is_alive() and len(failed) == 1

@@ -15,7 +15,7 @@ pub(crate) const CASES: &[Case] = &[
     ("points_field_frame_and_picture_are_the_same_as_elsewhere", same),
     ("plates_are_the_same_byte_for_byte", plate),
     ("wrong_flags_and_files_end_in_one_line_and_code_2", refusals),
-    ("frames_are_taken_over_tcp", served),
+    ("frames_are_taken_over_tcp_and_by_the_local_port", served),
     ("ctrl_c_ends_with_130_and_leaves_nothing_half_written", interrupted),
 ];
 
@@ -153,7 +153,8 @@ fn served(wine: &Wine) {
     let generic = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/calib/generic.toml")).expect("profile");
     let small = generic.replace("width = 1920", "width = 24").replace("height = 1080", "height = 16");
     fs::write(there.join("small.toml"), small).expect("write");
-    let flags = ["serve", "--monitor", "none", "--slmpy", "0", "--json", "--panel", "small.toml", "-o", "frames"];
+    let flags = ["serve", "--monitor", "none", "--slmpy", "0", "--local", "panel.port", "--json"];
+    let flags = [&flags[..], &["--panel", "small.toml", "-o", "frames"]].concat();
     let mut program = wine.holodrive(&there, &flags).stdout(Stdio::piped()).spawn().expect("runs");
     let mut line = String::new();
     BufReader::new(program.stdout.take().expect("output")).read_line(&mut line).expect("first line");
@@ -170,6 +171,23 @@ fn served(wine: &Wine) {
         let kept = image::open(there.join(format!("frames/frame-00000{number}.png"))).expect("frame").into_luma8();
         assert_eq!(kept.into_raw(), levels);
     }
+    // The local protocol: a port and its key in a file of the user's.
+    let told: Value = serde_json::from_slice(&fs::read(there.join("panel.port")).expect("port")).expect("JSON");
+    let stream = std::net::TcpStream::connect(told["address"].as_str().expect("address")).expect("connect");
+    let mut client = BufReader::new(stream);
+    let mut ask = |said: &[u8]| {
+        client.get_mut().write_all(said).expect("said");
+        let mut line = String::new();
+        client.read_line(&mut line).expect("answer");
+        serde_json::from_str::<Value>(&line).expect("JSON")
+    };
+    let key = serde_json::json!({ "key": told["key"] }).to_string() + "\n";
+    assert_eq!(ask(key.as_bytes())["width"], 24);
+    assert_eq!(ask(b"{\"show\": \"levels\", \"dtype\": \"uint8\"}\n")["send"], 24 * 16);
+    let levels: Vec<u8> = (0..24 * 16).map(|i| (i % 249) as u8).collect();
+    assert_eq!(ask(&levels)["number"], 3);
+    let kept = image::open(there.join("frames/frame-000003.png")).expect("frame").into_luma8();
+    assert_eq!(kept.into_raw(), levels);
     wine.end_all();
     program.wait().expect("ends");
 }

@@ -31,8 +31,9 @@ pub(crate) struct ServeArgs {
     /// Speak slmPy's protocol on this port; 0: a free one [default: all protocols, this on 9999].
     #[arg(help_heading = "Protocols", long, value_name = "PORT")]
     pub(crate) slmpy: Option<u16>,
-    /// Speak the local protocol of holodrive.py on this socket [default: NAME.sock in the user's runtime folder].
-    #[arg(help_heading = "Protocols", long, value_name = "SOCKET", num_args = 0..=1)]
+    /// Speak the local protocol of holodrive.py on this socket, or on a free port, which this file of yours (NAME.port) tells
+    /// with a key [default: NAME.sock in the user's runtime folder; on Windows NAME.port].
+    #[arg(help_heading = "Protocols", long, value_name = "SOCKET|FILE.port", num_args = 0..=1)]
     pub(crate) local: Option<Option<PathBuf>>,
     /// Hear triggers on this port, 0: a free one. A line of text shows the next frame of the list that a local client has
     /// armed (SLM.arm), or the preloaded frame of that name; the answer is its number, time and missed refreshes.
