@@ -600,7 +600,8 @@ mod port {
 
         fn line(&mut self) -> String {
             let mut line = String::new();
-            self.0.read_line(&mut line).expect("answer");
+            // One that is cut off while it still sends may be told so by an error.
+            let _ = self.0.read_line(&mut line);
             line
         }
 

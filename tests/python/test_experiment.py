@@ -44,9 +44,9 @@ def test_preloaded_frames_are_shown_by_name_played_and_forgotten(served: hd.Serv
         assert other.show("1").number == 2
         played = slm.play([0, 1, 2, 3, 2], rate=50)
         assert [frame.number for frame in played] == [3, 4, 5, 6, 7]
-        gaps = np.diff([frame.time for frame in played])
-        # A frame is never early; a busy machine may be late.
-        assert (gaps > 0.015).all() and sum(gaps) >= 0.08
+        times = np.array([frame.time for frame in played])
+        # A frame is never early; on a busy machine one may be late, and the next in time again.
+        assert (times - times[0] > 0.02 * np.arange(5) - 1e-3).all()
         assert played[0].time <= time.monotonic()
         slm.show("blaze")
         with pytest.raises(hd.DisplayError, match="'?nine'?"):
