@@ -565,7 +565,6 @@ fn every_command_of_the_readme_runs() {
         "holodrive-out/seen-near.png",
         "holodrive-out/seen-far.png",
         "seen/sweep-focus.png",
-        "seen/sweep-eye.png",
         "preview.png",
     ];
     every_command_runs("README.md", 16, &made);
