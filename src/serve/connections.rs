@@ -6,7 +6,7 @@ use super::local_port::{self, PortFile};
 #[cfg(unix)]
 use super::local_socket::LocalSocket;
 use super::log::Log;
-use super::stream::Stream;
+use super::stream::{Stream, reachable};
 use super::{Announcement, FrameRequest, ServeCounts, ServeSettings, ServedPanel};
 use crate::error::{Error, Result};
 use std::io;
@@ -230,17 +230,6 @@ impl Drop for Server {
             socket.remove();
         }
     }
-}
-
-/// The address by which this machine reaches a listener on `address`.
-pub(super) fn reachable(mut address: SocketAddr) -> SocketAddr {
-    if address.ip().is_unspecified() {
-        address.set_ip(match address {
-            SocketAddr::V4(_) => std::net::Ipv4Addr::LOCALHOST.into(),
-            SocketAddr::V6(_) => std::net::Ipv6Addr::LOCALHOST.into(),
-        });
-    }
-    address
 }
 
 /// Takes a client in, in a thread of its own; if there are too many, cuts off the longest silent one of its kind.

@@ -133,7 +133,7 @@ impl Told {
     fn answers(&self) -> bool {
         let soon = Duration::from_secs(1);
         let ask = || -> std::io::Result<String> {
-            let mut stream = TcpStream::connect_timeout(&super::connections::reachable(self.address), soon)?;
+            let mut stream = TcpStream::connect_timeout(&super::stream::reachable(self.address), soon)?;
             stream.set_read_timeout(Some(soon))?;
             let greeting = serde_json::to_string(&Greeting { key: self.key.clone() })?;
             writeln!(stream, "{greeting}")?;

@@ -1,7 +1,7 @@
 //! A connection of either kind: over the network, or by a socket in the file system of this machine.
 
 use std::io::{self, Read, Write};
-use std::net::{Shutdown, TcpStream};
+use std::net::{Shutdown, SocketAddr, TcpStream};
 #[cfg(unix)]
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
@@ -91,4 +91,15 @@ impl Write for Stream {
             Self::Local(stream) => stream.flush(),
         }
     }
+}
+
+/// The address by which this machine reaches a listener on `address`.
+pub(super) fn reachable(mut address: SocketAddr) -> SocketAddr {
+    if address.ip().is_unspecified() {
+        address.set_ip(match address {
+            SocketAddr::V4(_) => std::net::Ipv4Addr::LOCALHOST.into(),
+            SocketAddr::V6(_) => std::net::Ipv6Addr::LOCALHOST.into(),
+        });
+    }
+    address
 }
