@@ -76,7 +76,12 @@ impl Settings {
         })
     }
 
-    /// How the scene of a plate was lit.
+    /// How the scene of a plate was lit; the usual way where nothing was.
+    pub(super) fn options(&self) -> SceneOptions {
+        serde_json::from_value(Value::Object(self.options.clone().into_iter().collect())).unwrap_or_default()
+    }
+
+    /// How the scene of a plate was lit, by its file.
     ///
     /// # Errors
     /// [`Error::Input`] when the file is not the one that the plate was made of.
@@ -210,26 +215,37 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
+/// SHA-256 of a file, hexadecimal.
+///
+/// # Errors
+/// [`Error::Io`].
+pub(super) fn file_sha256(path: &Path) -> Result<String> {
+    let mut file = File::open(path).map_err(Error::io(path))?;
+    let mut digest = Sha256::new();
+    let mut buffer = vec![0u8; 1 << 20];
+    loop {
+        match file.read(&mut buffer).map_err(Error::io(path))? {
+            0 => return Ok(hex(&digest.finalize())),
+            n => digest.update(&buffer[..n]),
+        }
+    }
+}
+
+/// Whether two plates are the same but for the last bits that a reader of decimals may lose.
+pub(super) fn same_plate(a: &Plate, b: &Plate) -> bool {
+    let tree = |plate: &Plate| serde_json::to_value(plate).unwrap_or(Value::Null);
+    differing("", &tree(a), &tree(b)).is_none()
+}
+
 /// Hashes of a scene or cloud and, for a glTF, of the files that it names; and of the panorama around it.
 ///
 /// # Errors
 /// [`Error::Io`] for files that cannot be read.
 fn inputs(path: &Path, around: Option<&Path>) -> Result<Vec<Input>> {
-    let hash = |path: &Path| -> Result<String> {
-        let mut file = File::open(path).map_err(Error::io(path))?;
-        let mut digest = Sha256::new();
-        let mut buffer = vec![0u8; 1 << 20];
-        loop {
-            match file.read(&mut buffer).map_err(Error::io(path))? {
-                0 => return Ok(hex(&digest.finalize())),
-                n => digest.update(&buffer[..n]),
-            }
-        }
-    };
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().to_string();
     // What is beside an embedded scene changes with the program only, as the scene does.
     let own = gltf::embedded(path).map(sha256);
-    let mut found = vec![Input { name: name(path), sha256: own.map_or_else(|| hash(path), Ok)? }];
+    let mut found = vec![Input { name: name(path), sha256: own.map_or_else(|| file_sha256(path), Ok)? }];
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
         let text = fs::read(path).map_err(Error::io(path))?;
         // What is no JSON is refused, with better words, by whoever reads the scene.
@@ -239,17 +255,17 @@ fn inputs(path: &Path, around: Option<&Path>) -> Result<Vec<Input>> {
         for uri in lists.iter().flatten().filter_map(|entry| entry.get("uri")?.as_str()) {
             let beside: PathBuf = path.parent().unwrap_or(Path::new("")).join(uri);
             if !uri.starts_with("data:") && beside.is_file() {
-                found.push(Input { name: uri.to_owned(), sha256: hash(&beside)? });
+                found.push(Input { name: uri.to_owned(), sha256: file_sha256(&beside)? });
             }
         }
     }
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) && !is_cloud(path) {
         for beside in gltf::File::open(path)?.files().iter().skip(1).filter(|beside| beside.is_file()) {
-            found.push(Input { name: name(beside), sha256: hash(beside)? });
+            found.push(Input { name: name(beside), sha256: file_sha256(beside)? });
         }
     }
     if let Some(around) = around {
-        found.push(Input { name: name(around), sha256: hash(around)? });
+        found.push(Input { name: name(around), sha256: file_sha256(around)? });
     }
     Ok(found)
 }

@@ -124,7 +124,7 @@ fn sample(fringes: &PlateFringes, progress: &Progress) -> Result<Sample> {
         if rect.area() == 0 {
             continue;
         }
-        let (field, work) = fringes.wave.field(&rect, &[Piece { segment, rect }], progress)?;
+        let (field, work) = fringes.field(&rect, &[Piece { segment, rect }], progress)?;
         if work.points > sample.most_points {
             (sample.most_points, busiest) = (work.points, Some(segment));
         }
@@ -143,7 +143,7 @@ fn sample(fringes: &PlateFringes, progress: &Progress) -> Result<Sample> {
             [(index * side).max(bounds[0]), ((index + 1) * side).min(bounds[1])]
         };
         let rect = Rect { x: span(segment[0], sides[0], area.x), y: span(segment[1], sides[1], area.y) };
-        let (field, work) = fringes.wave.field(&rect, &[Piece { segment, rect }], progress)?;
+        let (field, work) = fringes.field(&rect, &[Piece { segment, rect }], progress)?;
         sample.whole = work;
         let begin = Instant::now();
         fringes.levels(&field, &rect, 1.0);
@@ -162,7 +162,8 @@ fn sample(fringes: &PlateFringes, progress: &Progress) -> Result<Sample> {
     let [tiles_x, tiles_y] = tile_counts(plate);
     let per_tile = |side: u64| plate.file.tile.div_ceil(side) + u64::from(!plate.file.tile.is_multiple_of(side));
     let [wide, tall] = fringes.wave.plane.size;
-    sample.segments = tiles_x * tiles_y * per_tile(wide) * per_tile(tall);
+    let colors = plate.slit.as_ref().filter(|slit| slit.superimposed).map_or(1, |slit| slit.wavelengths.len() as u64);
+    sample.segments = tiles_x * tiles_y * per_tile(wide) * per_tile(tall) * colors;
     Ok(sample)
 }
 

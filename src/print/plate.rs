@@ -1,6 +1,7 @@
 //! A plate and all that decides its pixels.
 
 pub use super::fringe_settings::{Binarisation, FringeSettings, Polarity};
+use super::lamp::Lamp;
 use super::printer::Printer;
 use super::reference::Reference;
 use super::transfer::Transfer;
@@ -74,6 +75,9 @@ pub struct Plate {
     pub error: f64,
     /// Seed of phases, jitter and light.
     pub seed: u64,
+    /// The lamp that the finished plate is to be looked at with, where the profile tells: as wide and as coloured as that is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lamp: Option<Lamp>,
     /// The machine that prints it, where the profile tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub printer: Option<Printer>,

@@ -2,6 +2,7 @@
 
 use super::lamp::Lamp;
 use super::manifest::{Manifest, Settings};
+use super::plate::Plate;
 use super::preview::{Preview, PreviewSettings, preview};
 use crate::error::{Error, Result};
 use crate::points::colour::Lasers;
@@ -107,8 +108,33 @@ impl PlateView {
         self.color.as_ref().map_or_else(|| self.gray.picture.clone(), ColorPicture::luminance)
     }
 
+    /// What is seen, in linear light; gray in the light of one lamp.
+    pub fn picture(&self) -> ColorPicture {
+        self.color.clone().unwrap_or_else(|| gray(&self.gray.picture))
+    }
+
+    /// Columns and rows of the picture.
+    pub fn size(&self) -> (usize, usize) {
+        (self.gray.picture.width, self.gray.picture.height)
+    }
+
+    /// The plate.
+    pub fn plate(&self) -> &Plate {
+        &self.settings.plate
+    }
+
+    /// Diameter of the pupil [m].
+    pub fn pupil(&self) -> f64 {
+        self.pupil
+    }
+
+    /// Names of the files that the plate was made of.
+    pub(super) fn inputs(&self) -> Vec<String> {
+        self.settings.inputs.iter().map(|input| input.name.clone()).collect()
+    }
+
     /// Texts of a picture's file.
-    fn texts(&self, what: &str) -> [(&'static str, String); 2] {
+    pub(super) fn texts(&self, what: &str) -> [(&'static str, String); 2] {
         let ViewReport { eye, focus, wavelengths, center, half, .. } = &self.report;
         let mut described = serde_json::json!({
             "simulated": true,
@@ -137,14 +163,23 @@ impl PlateView {
         }
     }
 
-    /// Traces what the same eye should see of the plate's own scene, writes it, and says in the report how alike both are:
-    /// cell by cell, and over 4 × 4 cells, which hold less speckle.
+    /// Writes the picture below words that say what it is.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write_labelled(&self, path: &Path, share: f64) -> Result<()> {
+        let texts = self.texts("simulated view of a plate's fringes");
+        self.labelled(self.white(share)).write_png(path, &texts)
+    }
+
+    /// Traces what the same eye should see of the plate's own scene, writes it, below words where it is not to be bare, and says in
+    /// the report how alike both are: cell by cell, and over 4 × 4 cells, which hold less speckle.
     ///
     /// # Errors
     /// [`Error::Input`] when the scene is not the one that the plate was made of; [`Error::Parameter`] for points, which hide
     /// nothing, and for an eye so far aside that too many rays would be cast; those of the scene and its light;
     /// [`Error::Io`].
-    pub fn compare(&mut self, scene: &Path, path: &Path, progress: &Progress) -> Result<[Likeness; 2]> {
+    pub fn compare(&mut self, scene: &Path, path: &Path, bare: bool, progress: &Progress) -> Result<[Likeness; 2]> {
         let options = self.settings.options_for(scene)?;
         let plate = &self.settings.plate;
         let Object::Scene(scene) = Object::read(scene, &options, &plate.segments()?, progress)? else {
@@ -153,14 +188,23 @@ impl PlateView {
         let (traced, white) = (traced(&scene, self.report.eye, &self.gray, plate.seed, progress)?, scene.white());
         let texts = self.texts("traced view from the same eye");
         let (seen, target) = (self.luminance(), traced.luminance());
+        let alike = [likeness(&seen, &target, white), likeness(&blocks(&seen, 4), &blocks(&target, 4), white)];
+        (self.report.likeness, self.report.likeness_of_blocks) = (Some(alike[0]), Some(alike[1]));
         match &self.color {
+            _ if !bare => {
+                let shown = if self.color.is_some() { traced } else { gray(&target) };
+                self.traced_with_words(&shown, white).write_png(path, &texts)?;
+            }
             None => target.write_png(path, Scale::White(white), &texts)?,
             Some(_) => write_rgb_png(path, traced.width, traced.height, &traced.rgb, white, &texts)?,
         }
-        let alike = [likeness(&seen, &target, white), likeness(&blocks(&seen, 4), &blocks(&target, 4), white)];
-        (self.report.likeness, self.report.likeness_of_blocks) = (Some(alike[0]), Some(alike[1]));
         Ok(alike)
     }
+}
+
+fn gray(picture: &Picture) -> ColorPicture {
+    let Picture { width, height, values } = picture;
+    ColorPicture { width: *width, height: *height, rgb: values.iter().map(|v| [*v; 3]).collect() }
 }
 
 /// The picture that an eye at `eye` [m] should see of a scene where a preview stands.
