@@ -19,7 +19,7 @@ use crate::field::{Complex32, Complex64};
 use crate::progress::Progress;
 use crate::segments::{ObjectWave, Piece, Rect, Work};
 use rayon::prelude::*;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::time::Instant;
 
 /// Pixels beside and above a tile in which error diffusion settles: its errors are forgotten after some ten pixels.
@@ -80,6 +80,12 @@ impl PlateFringes {
             None => (None, None),
             Some(transfer) => (transfer.lines(&plate.fringe), transfer.tone(&plate.fringe)),
         };
+        let (area, fade) = (fringe_area(plate), plate.fade as f64);
+        // 0 at the edge, 1 where nothing fades.
+        let faded = |at: i64, [from, end]: [i64; 2]| {
+            let inside = (at - from).min(end - 1 - at) as f64 + 0.5;
+            if inside < fade { (0.5 - 0.5 * (PI * inside / fade).cos()) as f32 } else { 1.0 }
+        };
         // Lines of the highest level are what is open, or what is closed.
         let inwards = if polarity == Polarity::Negative { -1.0 } else { 1.0 };
         let mut out = vec![0.0; rect.area()];
@@ -89,6 +95,7 @@ impl PlateFringes {
                 let row = rect.y[0] + i as i64;
                 let wavelength = plate.wavelength_of(row);
                 plate.reference.row(grid, wavelength, row, rect.x[0]..rect.x[1], reference);
+                let shown = faded(row, area.y);
                 for (((t, &u), &r), column) in out.iter_mut().zip(field).zip(reference.iter()).zip(rect.x[0]..) {
                     let value = match lines {
                         Some(bias) => {
@@ -100,6 +107,7 @@ impl PlateFringes {
                         None if searched => fringe.value(u, r),
                         None => fringe.value(u, r).clamp(0.0, 1.0),
                     };
+                    let value = value * shown * faded(column, area.x);
                     let value = if polarity == Polarity::Negative { 1.0 - value } else { value };
                     *t = tone.as_ref().map_or(value, |tone| tone.level(value));
                 }

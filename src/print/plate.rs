@@ -71,6 +71,10 @@ pub struct Plate {
     /// noise [m]; none for other fringes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub eye_box: Option<[f64; 2]>,
+    /// Columns and rows along the edge of the fringes over which they fade away [px]: a hard edge sends light of the lamp aside, and
+    /// some of it to where the object is.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub fade: u64,
     /// Largest relative error of the computed field.
     pub error: f64,
     /// Seed of phases, jitter and light.
@@ -84,6 +88,10 @@ pub struct Plate {
     /// What that machine makes of levels and lines, where it was measured; it is undone in the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub transfer: Option<Transfer>,
+}
+
+fn is_zero(value: &u64) -> bool {
+    *value == 0
 }
 
 impl Raster {

@@ -83,6 +83,15 @@ impl Plate {
         if file.marks > file.guard {
             return Err(format!("marks = {} do not fit into guard = {}; raise guard", file.marks, file.guard));
         }
+        if self.fade > 0 && bits == 1 && self.fringe.binarisation != Binarisation::Diffusion {
+            return Err("fade is for 8 bits, or for binarisation = \"diffusion\"; leave it out".into());
+        }
+        if self.fade.saturating_add(file.guard).saturating_mul(2) > width.min(height) {
+            return Err(format!(
+                "fade = {} on each side is more than half of the fringes of {width}×{height}",
+                self.fade
+            ));
+        }
         let lengths = [
             ("pitch", pitch_x),
             ("pitch", pitch_y),

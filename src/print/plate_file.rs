@@ -43,6 +43,8 @@ struct PlateFile {
     guard: u64,
     #[serde(default)]
     marks: u64,
+    #[serde(default)]
+    fade: u64,
     tile: Option<u64>,
     segment: Option<u64>,
     error: Option<f64>,
@@ -278,6 +280,7 @@ impl Plate {
             },
             object_angle,
             eye_box,
+            fade: file.fade,
             error: at.within("error", file.error.unwrap_or(if file.bits == 1 { 1e-2 } else { 5e-3 }), 1e-4..=0.1)?,
             seed: file.seed,
             lamp: file.lamp.as_ref().map(|lamp| lamp.read(at)).transpose()?,
