@@ -2,6 +2,7 @@
 
 use super::args::{LampAsked, LookArgs, PreviewArgs, SheetArgs};
 use super::bar::Bar;
+use super::plate_source;
 use super::print::lengths;
 use super::report::{Report, seconds};
 use crate::print::preview::PreviewSettings;
@@ -106,9 +107,9 @@ pub(super) fn preview(args: &PreviewArgs) -> Result<Report> {
     let bar = Bar::new();
     let (share, progress) = (args.look.white, &bar.progress);
     let (mut view, settings) = look(&args.look, &mut report, progress)?;
-    if let Some(scene) = &args.traced {
+    if let Some(of) = &args.traced {
         let path = beside(&args.output, "traced");
-        let [alike, smooth] = view.compare(scene, &path, args.bare, progress)?;
+        let [alike, smooth] = view.compare(&plate_source::same(of)?, &path, args.bare, progress)?;
         let line =
             format!("traced       {}: SSIM {:.3}, over 4 × 4 cells {:.3}", path.display(), alike.ssim, smooth.ssim);
         report.add("traced", path.display().to_string(), line);

@@ -2,8 +2,8 @@
 
 use super::args::{ExportArgs, FileArgs, PrintArgs, PrintCommand, VerifyArgs, White};
 use super::bar::Bar;
-use super::plate_views;
 use super::report::{Report, count, seconds};
+use super::{plate_source, plate_views};
 use crate::print::export::{Frames, export};
 use crate::print::{Asked, Plan, Plate, PlateJob, PrintSettings, Shard, folder};
 use crate::segments::SceneOptions;
@@ -42,11 +42,11 @@ fn resolved(args: &PrintArgs) -> Result<PrintSettings> {
         folder => folder.clone().unwrap_or_default(),
     };
     let light = &args.light;
+    let asked = Asked { size: args.size, pitch: args.pitch, binarisation: args.binarisation, phase: args.phase };
+    let plate = Plate::find(path, &asked)?;
+    let input = plate_source::source(args, &input, &plate)?;
     Ok(PrintSettings {
-        plate: Plate::find(
-            path,
-            &Asked { size: args.size, pitch: args.pitch, binarisation: args.binarisation, phase: args.phase },
-        )?,
+        plate,
         input,
         options: scene_options(&light.file, light.bounces, light.photons, light.white)?,
         folder,

@@ -3,6 +3,7 @@
 use super::manifest::{Settings, same_plate};
 use super::plate::{Binarisation, Plate};
 use super::plate_size::{Asked, PlateSize};
+use super::source::PictureDepths;
 use crate::names::Named;
 use crate::segments::{PointPhase, SceneOptions};
 use crate::units::show_length;
@@ -18,11 +19,32 @@ fn quoted(text: &str) -> String {
     }
 }
 
+/// The input as it is typed, and where it stands.
+fn input(settings: &Settings) -> Vec<String> {
+    let names: Vec<&str> = settings.inputs.iter().map(|input| input.name.as_str()).collect();
+    match settings.pictures() {
+        None => names.first().map(|name| quoted(name)).into_iter().collect(),
+        Some(PictureDepths::Flat(depths)) => {
+            let each = names.iter().zip(depths).map(|(name, z)| format!("{name}@{}", show_length(z)));
+            vec![quoted(&each.collect::<Vec<_>>().join("+"))]
+        }
+        Some(PictureDepths::Relief { near, far, reading }) => {
+            let mut words = vec![quoted(&names.join("+"))];
+            words.extend(["--near".into(), show_length(near), "--far".into(), show_length(far)]);
+            words.extend(reading.scale.into_iter().flat_map(|scale| ["--depth-scale".into(), scale.name().into()]));
+            words.extend(reading.unit.into_iter().flat_map(|unit| ["--depth-unit".into(), show_length(unit)]));
+            let range = reading.range.map(|range| range.map(show_length).join(","));
+            words.extend(range.into_iter().flat_map(|range| ["--depth-range".into(), range]));
+            words
+        }
+    }
+}
+
 /// The command that makes the same plate. What it cannot say is in the manifest.
 pub(super) fn command(settings: &Settings, folder: &Path) -> String {
     let plate = &settings.plate;
     let mut words = vec!["holodrive".to_owned(), "print".to_owned()];
-    words.extend(settings.inputs.first().map(|input| quoted(&input.name)));
+    words.extend(input(settings));
     words.push("--plate".into());
     let built_in = Plate::embedded_names().find(|name| *name == plate.name);
     let found = built_in.and_then(|name| asked(name, plate));
@@ -87,12 +109,14 @@ fn asked(name: &str, plate: &Plate) -> Option<Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::print::Source;
 
     #[test]
     fn a_built_in_plate_is_named_with_what_was_asked_of_it_and_another_by_its_file() {
         let plate = |asked: &Asked| Plate::find("chrome-1um", asked).expect("plate");
         let of = |plate: Plate, options: SceneOptions| {
-            let settings = Settings::new(&plate, "scenes/cornell.gltf".as_ref(), &options).expect("settings");
+            let settings =
+                Settings::new(&plate, &Source::File("scenes/cornell.gltf".into()), &options).expect("settings");
             command(&settings, "my plate".as_ref())
         };
         let usual = of(plate(&Asked::default()), SceneOptions::default());

@@ -21,6 +21,10 @@ const LATTICE: i64 = 4;
 /// Side of the field that is computed in the middle of each [px].
 const PATCH: i64 = 192;
 
+/// What is said of points.
+pub(super) const NOT_A_SCENE: &str =
+    "points are the same from everywhere: nothing hides anything; give a scene for true views";
+
 /// What a few small fields of the plate show.
 #[derive(Default)]
 struct Sample {
@@ -277,7 +281,7 @@ fn warnings(fringes: &PlateFringes, plan: &Plan) -> Vec<String> {
         out.push("a phase of two levels has a conjugate image as bright as the object".into());
     }
     if !matches!(object, Object::Scene(_)) {
-        out.push("points are the same from everywhere: nothing hides anything; give a scene for true views".into());
+        out.push(NOT_A_SCENE.into());
     }
     if let Some(slit) = &plate.slit {
         let sine = plan.reference_frequencies[1][1].abs().max(plan.reference_frequencies[1][0].abs())

@@ -1,6 +1,7 @@
 //! Flags of plates.
 
 use super::parse::{LampAsked, White, lamp, one_of, part, position, size, white};
+use super::placement::DepthMapArgs;
 use super::scene::FileArgs;
 use crate::print::export::Format;
 use crate::print::{Binarisation, PlateSize};
@@ -15,7 +16,11 @@ use std::path::PathBuf;
 pub(crate) struct PrintArgs {
     #[command(subcommand)]
     pub(crate) command: Option<PrintCommand>,
-    /// A scene (.gltf, .glb, .obj, .stl), seen truly from each segment of the plate, or a point cloud (.ply, .xyz, .csv, .pcd, .las).
+    /// A scene (.gltf, .glb, .obj, .stl), seen truly from each segment of the plate; a point cloud (.ply, .xyz, .csv, .pcd, .las); or pictures.
+    ///
+    /// A picture (logo.png) stands at the plate's distance, or where it says (logo.png@-6mm), several behind each other
+    /// (a.png@-4mm+b.png@-8mm), one with a depth map between --near and --far (rgb.png+depth.png). It fills the plate as the viewer
+    /// sees it; what is clear or black in it lets what is behind through.
     pub(crate) input: Option<PathBuf>,
     /// The plate: a built-in one by name (see `holodrive plates`), or a TOML file.
     #[arg(long, value_name = "NAME|FILE")]
@@ -32,6 +37,14 @@ pub(crate) struct PrintArgs {
     /// Where the points of a scene stand, and in which phases, in place of the plate's own.
     #[arg(long, value_parser = one_of::<PointPhase>(), value_name = "PHASE")]
     pub(crate) phase: Option<PointPhase>,
+    /// Picture with a depth map: z of its nearest point, behind is negative [default: three quarters of the plate's distance].
+    #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) near: Option<f64>,
+    /// Picture with a depth map: z of its farthest point [default: five quarters of the plate's distance].
+    #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub(crate) far: Option<f64>,
+    #[command(flatten)]
+    pub(crate) map: DepthMapArgs,
     /// Folder for the plate. One that was begun with the same settings is gone on with; one of others is refused.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
@@ -118,7 +131,7 @@ pub(crate) struct LookArgs {
     #[arg(long, value_parser = units::length, value_name = "LENGTH")]
     pub(crate) bandwidth: Option<f64>,
     /// Places and wavelengths of the lamp that are looked at.
-    #[arg(hide_short_help = true, long, default_value_t = 48, value_name = "N")]
+    #[arg(hide_short_help = true, long, default_value_t = 24, value_name = "N")]
     pub(crate) places: usize,
     /// Pixels of the picture [default: 400 along the longer side].
     #[arg(long, value_parser = size, value_name = "WxH")]
@@ -150,7 +163,7 @@ pub(crate) struct PreviewArgs {
     /// Also walk past the plate, so far from left to right and back: an animated PNG, written beside as …-walk.png.
     #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) walk: Option<f64>,
-    /// Also trace what the eye should see of this scene, the plate's own; write it beside as …-traced.png and compare.
+    /// Also trace what the eye should see of this scene or of these pictures, the plate's own; write it beside as …-traced.png and compare.
     #[arg(long, value_name = "SCENE")]
     pub(crate) traced: Option<PathBuf>,
 }
