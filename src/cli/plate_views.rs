@@ -3,7 +3,6 @@
 use super::args::{LampAsked, LookArgs, PreviewArgs, SheetArgs};
 use super::bar::Bar;
 use super::plate_source;
-use super::print::lengths;
 use super::report::{Report, seconds};
 use crate::print::preview::PreviewSettings;
 use crate::print::{Lamp, Manifest, Plate, PlateView, write_pair, write_sheet, write_walk};
@@ -14,6 +13,11 @@ use std::path::{Path, PathBuf};
 
 /// Places of a walk, from one end to the other.
 const STEPS: usize = 13;
+
+/// Wavelengths in words.
+pub(super) fn lengths(wavelengths: &[f64]) -> String {
+    wavelengths.iter().map(|w| show_length(*w)).collect::<Vec<_>>().join(", ")
+}
 
 /// `name.png` → `name-WHAT.png`.
 fn beside(path: &Path, what: &str) -> PathBuf {

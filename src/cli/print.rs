@@ -133,10 +133,6 @@ fn bytes(bytes: u64) -> String {
     }
 }
 
-pub(super) fn lengths(wavelengths: &[f64]) -> String {
-    wavelengths.iter().map(|w| show_length(*w)).collect::<Vec<_>>().join(", ")
-}
-
 fn report_plan(plan: &Plan, plate: &Plate) -> Report {
     let mut report = Report::new("plan");
     report.section(plan);
@@ -171,7 +167,7 @@ fn report_plan(plan: &Plan, plate: &Plate) -> Report {
             show_length(slit.height),
             show_length(plate.view.viewer),
             slit.strip,
-            lengths(&slit.wavelengths)
+            plate_views::lengths(&slit.wavelengths)
         ));
     }
     report.line(format!(
