@@ -34,6 +34,7 @@ mod eye_tests;
 mod from_scene;
 mod gather;
 pub mod images;
+mod light_error;
 #[cfg(test)]
 mod odd_tests;
 mod placed;
@@ -54,6 +55,7 @@ pub(crate) mod white;
 pub use axes::Axes;
 pub use exposure::{Exposure, Share};
 pub use from_scene::{LitScene, ScenePoints, SceneSettings};
+pub use light_error::light_error;
 pub use placed::{Placed, place};
 pub use placement::Placement;
 pub use placing_cloud::PlacedCloud;
