@@ -45,6 +45,7 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
         Placement::Window { near, far, .. } => [near, far],
         Placement::Model { z, .. } => [z, z],
     };
+    settings.scene.estimate = false;
     settings.encode.fix_depths(content);
     // What cannot be is found out before the work.
     if !matches!(settings.encode.encoding, Some(Encoding::View(_))) {

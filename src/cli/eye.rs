@@ -74,7 +74,7 @@ pub(super) fn views(args: &ViewsArgs) -> Result<Report> {
         _ => None,
     };
     let settings = Settings {
-        scene: resolve::scene(&args.light, &args.placement, White::Auto),
+        scene: resolve::scene(&args.light, &args.placement, White::Auto)?,
         channel: args.channel.channel,
         viewer: resolve::viewer(&args.viewer, Some(&args.placement), file.as_ref()),
         ..Settings::default()

@@ -41,6 +41,7 @@ pub(super) fn report_light(scene: &ScenePoints, elapsed: f64, report: &mut Repor
         "energy_escaped": energy.escaped.to_array(),
         "lamp_images": light.lamp_images,
         "photons": light.photons,
+        "light_error": scene.light_error,
         "light_residual": convergence.residual,
         "light_seconds": light.seconds,
         "patches": light.patches,
@@ -67,6 +68,10 @@ pub(super) fn report_light(scene: &ScenePoints, elapsed: f64, report: &mut Repor
     );
     report.line(step("light", light.seconds, what));
     report.line(step("rays", trace.seconds, format!("{} rays", count(trace.rays as usize))));
+    if let Some(error) = scene.light_error {
+        let share = format!("{:.2} %", 100.0 * error);
+        report.line(format!("light error            about {share} of the mean (root mean square over blocks of 5 × 5 rays, from a second look)"));
+    }
     if let Some(rays) = &scene.rays {
         report_budget(rays, scene, report);
     }

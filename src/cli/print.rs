@@ -1,9 +1,10 @@
 //! Plates: planned, computed, checked, looked at, exported.
 
-use super::args::{ExportArgs, FileArgs, PrintArgs, PrintCommand, VerifyArgs, White};
+use super::args::{ExportArgs, FileArgs, PrintArgs, PrintCommand, QualityArgs, VerifyArgs, White};
 use super::bar::Bar;
 use super::report::{Report, count, seconds};
 use super::{plate_source, plate_views};
+use crate::illumination::IlluminationSettings;
 use crate::print::export::{Frames, export};
 use crate::print::{Asked, Plan, Plate, PlateJob, PrintSettings, Shard, folder};
 use crate::segments::SceneOptions;
@@ -20,17 +21,40 @@ pub(super) fn print(args: &PrintArgs, json: bool) -> Result<Report> {
     }
 }
 
-/// How a scene is lit: its flags, bounces and photons.
-pub(super) fn scene_options(file: &FileArgs, bounces: u32, photons: u32, white: Option<White>) -> Result<SceneOptions> {
+/// How a scene is lit: its flags, and the rest of what is typed of its light.
+pub(super) fn scene_options(file: &FileArgs, light: Lighting, white: Option<White>) -> Result<SceneOptions> {
+    let Lighting { bounces, photons, quality } = light;
     let white = match white {
         None | Some(White::Auto) => None,
         Some(White::None) => Some(f32::MAX),
         Some(White::At(white)) if white > 0.0 && white.is_finite() => Some(white),
         Some(White::At(white)) => return Err(Error::out_of_range("white", white, "must be greater than zero")),
     };
-    let environment = file.panorama();
+    let (environment, sky) = (file.panorama(), file.sky());
     let FileArgs { camera, animation, time, viewer_light, allow_outside, .. } = file.clone();
-    Ok(SceneOptions { camera, animation, time, viewer_light, allow_outside, environment, bounces, photons, white })
+    let light_error = quality.error();
+    let usual = IlluminationSettings::default().for_error(light_error)?;
+    let photons = photons.unwrap_or(usual.photons);
+    Ok(SceneOptions {
+        camera,
+        animation,
+        time,
+        viewer_light,
+        allow_outside,
+        environment,
+        sky,
+        bounces,
+        photons,
+        light_error,
+        white,
+    })
+}
+
+/// What is typed of a scene's light beside its files.
+pub(super) struct Lighting<'a> {
+    pub(super) bounces: u32,
+    pub(super) photons: Option<u32>,
+    pub(super) quality: &'a QualityArgs,
 }
 
 fn resolved(args: &PrintArgs) -> Result<PrintSettings> {
@@ -48,7 +72,11 @@ fn resolved(args: &PrintArgs) -> Result<PrintSettings> {
     Ok(PrintSettings {
         plate,
         input,
-        options: scene_options(&light.file, light.bounces, light.photons, light.white)?,
+        options: scene_options(
+            &light.file,
+            Lighting { bounces: light.bounces, photons: light.photons, quality: &light.quality },
+            light.white,
+        )?,
         folder,
         shard: match &args.shard {
             Some(text) => Shard::parse(text, |name| std::env::var(name).ok())?,

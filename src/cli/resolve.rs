@@ -66,8 +66,10 @@ pub(super) fn told_correction(setup: &Setup, report: &mut Report) -> Result<Opti
     Ok(found)
 }
 
-pub(super) fn scene(light: &SceneArgs, placement: &PlacementArgs, default_white: White) -> SceneSettings {
-    SceneSettings {
+pub(super) fn scene(light: &SceneArgs, placement: &PlacementArgs, default_white: White) -> Result<SceneSettings> {
+    let error = light.quality.error();
+    let usual = IlluminationSettings::default().for_error(error)?;
+    Ok(SceneSettings {
         load: LoadOptions {
             camera: light.file.camera.as_deref().map(Choice::from),
             clip: light.file.animation.as_deref().map_or(Clip::First, |name| Clip::Of(Choice::from(name))),
@@ -75,15 +77,16 @@ pub(super) fn scene(light: &SceneArgs, placement: &PlacementArgs, default_white:
             viewer_light: light.file.viewer_light,
             allow_outside: light.file.allow_outside,
             environment: light.file.panorama(),
+            sky: light.file.sky(),
             ..LoadOptions::default()
         },
         illumination: IlluminationSettings {
             form_factor: light.form_factor,
             bounces: light.bounces,
             final_gather: light.final_gather,
-            photons: light.photons,
+            photons: light.photons.unwrap_or(usual.photons),
             seed: light.random.seed,
-            ..IlluminationSettings::default()
+            ..usual
         },
         trace: TraceSettings {
             width: light.rays.0 as u32,
@@ -91,7 +94,7 @@ pub(super) fn scene(light: &SceneArgs, placement: &PlacementArgs, default_white:
             bounces: light.bounces,
             mirror_depth: light.mirror_depth,
             seed: light.random.seed,
-            ..TraceSettings::default()
+            ..TraceSettings::default().for_error(error)
         },
         points: light.points,
         placement: self::placement(placement),
@@ -102,7 +105,8 @@ pub(super) fn scene(light: &SceneArgs, placement: &PlacementArgs, default_white:
             White::At(value) => WhitePoint::At(value),
         },
         anchors: SequenceAnchors::default(),
-    }
+        estimate: true,
+    })
 }
 
 pub(super) fn placement(args: &PlacementArgs) -> Placement {
@@ -230,7 +234,7 @@ pub(super) fn settings(args: &ShowArgs, setup: Setup, usual: Encoding) -> Result
         view.seed = args.light.random.seed;
     }
     let settings = Settings {
-        scene: scene(&args.light, &args.placement, White::Auto),
+        scene: scene(&args.light, &args.placement, White::Auto)?,
         channel: args.channel.channel,
         sub_frames,
         hologram: hologram(&args.hologram),

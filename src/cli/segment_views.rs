@@ -2,7 +2,7 @@
 
 use super::args::{ComputeArgs, PlacementArg, PlacementArgs};
 use super::load::Input;
-use super::print::scene_options;
+use super::print::{Lighting, scene_options};
 use super::report::{Report, count, seconds};
 use crate::field::{npy, stored};
 use crate::panel::Setup;
@@ -35,7 +35,8 @@ pub(super) fn compute(
         ..Segments::of_panel(panel.grid, panel.wavelength, segment)?
     };
     let light = &args.light;
-    let options = scene_options(&light.file, light.bounces, light.photons, args.light.white)?;
+    let typed = Lighting { bounces: light.bounces, photons: light.photons, quality: &light.quality };
+    let options = scene_options(&light.file, typed, args.light.white)?;
     let object = Object::read(path, &options, &plane, progress)?;
     let depths = object.depths();
     let seen = ObjectWave::new(plane, object).whole(progress)?;

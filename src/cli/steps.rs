@@ -31,7 +31,7 @@ pub(super) fn points(args: &PointsArgs) -> Result<Report> {
         return Err(Error::input(&args.scene, "is no scene (.gltf, .glb, .obj, .stl) and no point cloud"));
     }
     let bar = Bar::new();
-    let settings = resolve::scene(&args.light, &args.placement, White::None);
+    let settings = resolve::scene(&args.light, &args.placement, White::None)?;
     let reading = resolve::reading(&args.map, &args.placement);
     let points = Points::load(&source, &settings, &reading, &setup, &bar.progress, &mut report)?;
     if let Some(lasers) = &setup.lasers {
@@ -106,7 +106,7 @@ pub(super) fn compute(args: &ComputeArgs) -> Result<Report> {
         return Ok(report);
     }
     let settings = Settings {
-        scene: resolve::scene(&args.light, &args.placement, White::Auto),
+        scene: resolve::scene(&args.light, &args.placement, White::Auto)?,
         channel: args.channel.channel,
         hologram: resolve::hologram(&args.hologram),
         ..Settings::default()

@@ -8,15 +8,16 @@ use super::elements::NONE;
 use super::emitter::{Emitter, EmitterPoint, Piece};
 use super::form_factor::{FormFactor, point_to_element, point_to_polygon};
 use super::paths::Optics;
+use super::punctual::{PER_SUN, arriving};
 use super::sampling::triangle_weights;
 use super::shaft::Shaft;
 use super::surface::{ShadingPoint, Surface};
 use crate::random::Random;
 use crate::scene::bvh::{Hit, SceneBvh};
-use crate::scene::{LightKind, PunctualLight, Scene};
+use crate::scene::{PunctualLight, Scene};
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
-use std::f64::consts::{FRAC_1_PI, PI};
+use std::f64::consts::PI;
 
 /// An emitter with more than this part of the surface of the scene's box is no lamp but a glowing wall: its shadows are
 /// as soft as those of other walls, and it lights through radiosity like them.
@@ -174,7 +175,9 @@ impl Emitters {
             }
             sum += tally.mean() * factor as f32;
         }
-        (sum * self.scale(), self.punctual.iter().map(|light| arriving(optics, light, at, |_| Vec3::ONE)).sum())
+        let sets = [rays.first, rays.penumbra].map(|rays| rays / PER_SUN);
+        let punctual = self.punctual.iter().map(|light| arriving(optics, light, at, sets, |_| Vec3::ONE, random)).sum();
+        (sum * self.scale(), punctual)
     }
 
     /// The factor by which a transfer differs from Lambert's.
@@ -266,59 +269,6 @@ impl Tally {
     fn mean(&self) -> Vec3 {
         if self.weight <= 0.0 { Vec3::ZERO } else { self.light / self.weight as f32 }
     }
-}
-
-/// Irradiance over π that a punctual light would give if nothing stood in the way, and where its light comes from [m]: a
-/// point beyond the scene of that `size` [m] for a directional one. `None` where it gives none.
-pub(crate) fn punctual_light(size: f64, light: &PunctualLight, at: ShadingPoint) -> Option<(Vec3, DVec3)> {
-    let ShadingPoint { position: point, normal } = at;
-    let (towards, distance, strength) = match light.kind {
-        LightKind::Directional => (-light.direction.as_dvec3(), f64::INFINITY, 1.0),
-        LightKind::Point | LightKind::Eye | LightKind::Spot { .. } => {
-            let span = light.position.as_dvec3() - point;
-            let distance = span.length();
-            let range = f64::from(light.range);
-            // KHR_lights_punctual's window, which ends the light at its range.
-            let window = if range.is_finite() { (1.0 - (distance / range).powi(4)).clamp(0.0, 1.0) } else { 1.0 };
-            (span / distance, distance, window / (distance * distance))
-        }
-    };
-    let strength = match light.kind {
-        LightKind::Spot { inner, outer } => {
-            let (inner, outer) = (f64::from(inner).cos(), f64::from(outer).cos());
-            let cosine = -towards.dot(light.direction.as_dvec3());
-            let edge = ((cosine - outer) / (inner - outer).max(1e-3)).clamp(0.0, 1.0);
-            strength * edge * edge
-        }
-        _ => strength,
-    };
-    let cosine = normal.dot(towards);
-    if !(cosine > 0.0 && strength > 0.0 && strength.is_finite()) {
-        return None;
-    }
-    let end = if distance.is_finite() { light.position.as_dvec3() } else { point + towards * (2.0 * size) };
-    Some((light.intensity * (strength * cosine * FRAC_1_PI) as f32, end))
-}
-
-/// Irradiance over π that arrives from a punctual light, times a factor of the unit direction to it; shadows are looked for
-/// where that is not zero.
-pub(super) fn arriving(
-    optics: &Optics,
-    light: &PunctualLight,
-    at: ShadingPoint,
-    factor: impl Fn(DVec3) -> Vec3,
-) -> Vec3 {
-    let Some((strength, end)) = punctual_light(optics.bvh.size(), light, at) else { return Vec3::ZERO };
-    let strength = strength * factor((end - at.position).normalize());
-    if strength.max_element() <= 0.0 {
-        return Vec3::ZERO;
-    }
-    let seen = if light.kind == LightKind::Eye {
-        optics.seen_from(end, at.position)
-    } else {
-        optics.transmittance(at.position, end)
-    };
-    strength * seen
 }
 
 /// What all surfaces would show, in the sum of the colours, if the emitters' light were spread evenly over a closed room

@@ -5,8 +5,9 @@
 //! by how densely it looks there (the balance heuristic, Veach & Guibas 1995), so that the sum is right and neither way's rare
 //! finds are bright.
 
-use super::emitters::{Emitters, arriving};
+use super::emitters::Emitters;
 use super::paths::Optics;
+use super::punctual::{PER_SUN, arriving};
 use super::sampling::spread;
 use super::surface::Surface;
 use crate::random::Random;
@@ -54,7 +55,8 @@ impl Emitters {
     ) -> Vec3 {
         let at = surface.shading_point(optics.bvh.offset());
         let lobe = |towards: DVec3| surface.lobe(-direction, towards) * PI as f32;
-        let mut sum: Vec3 = self.punctual.iter().map(|light| arriving(optics, light, at, lobe)).sum();
+        let sets = [rays.div_ceil(PER_SUN), 0];
+        let mut sum: Vec3 = self.punctual.iter().map(|l| arriving(optics, l, at, sets, lobe, random)).sum();
         let points = if self.polygons.is_empty() { 0 } else { points(surface, rays) };
         let shift: [f64; 4] = std::array::from_fn(|_| random.uniform());
         for number in 0..points {

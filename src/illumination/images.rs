@@ -72,14 +72,20 @@ impl Images {
         self.strong.len() + self.weak.len()
     }
 
-    /// Irradiance over π from images that make shadows of their own, at a point.
-    pub(crate) fn strong(&self, lamps: Lamps, at: ShadingPoint, rays: ShadowRays, random: &mut Random) -> Vec3 {
-        self.strong.iter().map(|image| image.light(lamps, at, rays, random)).sum()
+    /// Irradiance over π from images that make shadows of their own, at a point: of emitting surfaces, and of punctual lights.
+    pub(crate) fn strong(&self, lamps: Lamps, at: ShadingPoint, rays: ShadowRays, random: &mut Random) -> (Vec3, Vec3) {
+        light_of(&self.strong, lamps, at, rays, random)
     }
 
     /// The same from all others.
-    pub(crate) fn weak(&self, lamps: Lamps, at: ShadingPoint, random: &mut Random) -> Vec3 {
-        let rays = ShadowRays { first: 4, penumbra: 0, clear: 0 };
-        self.weak.iter().map(|image| image.light(lamps, at, rays, random)).sum()
+    pub(crate) fn weak(&self, lamps: Lamps, at: ShadingPoint, random: &mut Random) -> (Vec3, Vec3) {
+        light_of(&self.weak, lamps, at, ShadowRays { first: 4, penumbra: 0, clear: 0 }, random)
     }
+}
+
+fn light_of(images: &[Image], lamps: Lamps, at: ShadingPoint, rays: ShadowRays, random: &mut Random) -> (Vec3, Vec3) {
+    images.iter().fold((Vec3::ZERO, Vec3::ZERO), |(areas, points), image| {
+        let light = image.light(lamps, at, rays, random);
+        if image.is_of_point() { (areas, points + light) } else { (areas + light, points) }
+    })
 }

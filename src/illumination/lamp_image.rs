@@ -1,9 +1,10 @@
 //! One lamp as a row of flat mirrors shows it.
 
-use super::emitters::{Emitters, MOST_REDRAWS, ShadowRays, punctual_light};
+use super::emitters::{Emitters, MOST_REDRAWS, ShadowRays};
 use super::flat_mirrors::{FlatMirror, polygon_area};
 use super::form_factor::{clip, point_to_element, point_to_polygon};
 use super::paths::Optics;
+use super::punctual::punctual_light;
 use super::reflection::reflected;
 use super::sampling::GOLDEN;
 use super::surface::{ShadingPoint, Surface};
@@ -181,6 +182,11 @@ impl Image {
         f64::from(light.element_sum() * self.reflectance)
     }
 
+    /// Whether it is one of a punctual light.
+    pub(super) fn is_of_point(&self) -> bool {
+        matches!(self.source, LampSource::Point(_))
+    }
+
     /// Irradiance over π.
     pub(super) fn light(&self, lamps: Lamps, at: ShadingPoint, rays: ShadowRays, random: &mut Random) -> Vec3 {
         let ShadingPoint { position: point, normal } = at;
@@ -281,7 +287,7 @@ impl PunctualLight {
     /// Whether it stands on the side of a mirror that reflects, or shines on it from infinity.
     fn shines_on(&self, mirror: &FlatMirror) -> bool {
         match self.kind {
-            LightKind::Directional => self.direction.as_dvec3().dot(mirror.normal) < 0.0,
+            LightKind::Directional | LightKind::Sun { .. } => self.direction.as_dvec3().dot(mirror.normal) < 0.0,
             _ => mirror.height(self.position.as_dvec3()) > 0.0,
         }
     }

@@ -35,6 +35,7 @@ mod emitter;
 mod emitters;
 mod flat_mirrors;
 mod form_factor;
+mod gathered;
 mod glints;
 mod images;
 #[cfg(test)]
@@ -45,13 +46,17 @@ mod meshing;
 mod patches;
 pub(crate) mod paths;
 mod photons;
+mod pieces;
 mod probes;
+mod punctual;
 mod radiosity;
 pub(crate) mod reflection;
 mod sampling;
+mod settings;
 mod shading;
 mod shaft;
 mod sky;
+mod spread;
 mod surface;
 #[cfg(test)]
 pub(crate) mod test_oracle;
@@ -65,10 +70,12 @@ pub use form_factor::FormFactor;
 pub(crate) use glints::LobeRay;
 pub(crate) use irradiance_cache::IrradianceCache;
 pub use radiosity::Convergence;
+pub use settings::{IlluminationSettings, Quality};
 pub(crate) use shading::DiffuseLight;
+pub(crate) use spread::Noted;
 pub(crate) use surface::Surface;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::progress::Progress;
 use crate::random::Random;
 use crate::scene::bvh::SceneBvh;
@@ -84,76 +91,10 @@ use paths::Optics;
 use probes::Probes;
 use radiosity::Surroundings;
 use rayon::prelude::*;
+use spread::Sampled;
 use std::sync::Arc;
 use std::time::Instant;
 use transport::{GatheringRays, Transport};
-
-/// How light is computed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct IlluminationSettings {
-    /// How flux is divided; the seed paper's eq. (1) on request.
-    pub form_factor: FormFactor,
-    /// The solver stops when no colour's residual is larger than this part of the right-hand side.
-    pub residual: f64,
-    /// Rays per vertex that gather indirect light; fewer are cast when the scene has very many vertices, more where brightness
-    /// jumps.
-    pub indirect_rays: u32,
-    /// Shadow rays per point for all emitters together.
-    pub shadow_rays: u32,
-    /// Further shadow rays where an emitter is seen in part.
-    pub penumbra_rays: u32,
-    /// Longest edge of an element over the diagonal of the scene.
-    pub longest_element: f64,
-    /// Edges are not split below this part of the scene's diagonal.
-    pub shortest_element: f64,
-    /// An edge may be this many times as long as its surroundings are near.
-    pub nearness: f64,
-    /// Elements are not split beyond this many vertices.
-    pub most_vertices: usize,
-    /// Rays with which each point gathers indirect light for itself instead of reading the mesh.
-    pub final_gather: Option<u32>,
-    /// Most mirrors or glass surfaces that light follows one after another.
-    pub bounces: u32,
-    /// Photons that lamps send through curved mirrors, glass and rough metal; none are sent where there is none of it.
-    pub photons: u32,
-    /// Seed of all sampling.
-    pub seed: u64,
-}
-
-impl IlluminationSettings {
-    /// The same with rougher light, without caustics, for a first look.
-    pub fn coarse(self) -> Self {
-        Self {
-            residual: 1e-2,
-            indirect_rays: 32,
-            photons: 0,
-            final_gather: None,
-            longest_element: 0.2,
-            shortest_element: 0.1,
-            ..self
-        }
-    }
-}
-
-impl Default for IlluminationSettings {
-    fn default() -> Self {
-        Self {
-            form_factor: FormFactor::Lambert,
-            residual: 1e-4,
-            indirect_rays: 324,
-            shadow_rays: 16,
-            penumbra_rays: 64,
-            longest_element: 1.0 / 16.0,
-            shortest_element: 1.0 / 80.0,
-            nearness: 0.8,
-            most_vertices: 60_000,
-            final_gather: None,
-            bounces: 32,
-            photons: 400_000,
-            seed: 1,
-        }
-    }
-}
 
 /// Where the light went [W], linear RGB.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -200,10 +141,6 @@ pub struct IlluminationReport {
     pub seconds: f64,
 }
 
-/// Most gathering rays in all: probes beyond some tens of thousands lie so close that the noise of each counts less.
-const MOST_GATHERING_RAYS: usize = 4_000_000;
-/// The same with those that look again where brightness jumps.
-const MOST_RAYS_IN_ALL: usize = 6_000_000;
 /// Residual at which it is known well enough which patches are bright.
 const ROUGH_RESIDUAL: f64 = 1e-2;
 /// Distance within which vertices share gathering rays, over the shortest edge that is split.
@@ -226,6 +163,8 @@ pub struct Illumination {
     leaving: Vec<Vec3>,
     /// Indirect irradiance over π at the vertices, with that of weak images of lamps.
     irradiance: Vec<Vec3>,
+    /// How the mesh's light was sampled.
+    sampled: Sampled,
     report: IlluminationReport,
 }
 
@@ -233,7 +172,7 @@ impl Illumination {
     /// Lights a scene.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a setting outside its domain, [`Error::Interrupted`] when asked to stop.
+    /// [`crate::Error::OutOfRange`] for a setting outside its domain, [`crate::Error::Interrupted`] when asked to stop.
     pub fn new(bvh: impl Into<Arc<SceneBvh>>, settings: IlluminationSettings, progress: &Progress) -> Result<Self> {
         settings.check()?;
         let bvh = bvh.into();
@@ -262,9 +201,7 @@ impl Illumination {
         let weak = weak_light(lamps, &images, &mesh, settings.seed ^ 0x3ea7, progress)?;
         let clear = clear_views(lamps, &mesh);
         let (mut patches, senders) = Patches::new(lamps, &images, &mesh, &clear, &settings, progress)?;
-        for (direct, &sender) in patches.direct.iter_mut().zip(&senders.all) {
-            *direct += mesh.mean_over(sender, &weak);
-        }
+        patches.add(&mesh, &senders, &weak);
         // Where nothing scatters no photon can end.
         let count = if mesh.vertices.is_empty() { 0 } else { settings.photons };
         let photons = photons::shoot(lamps, count, settings.seed ^ 0xf070, progress)?;
@@ -274,13 +211,14 @@ impl Illumination {
         progress.check()?;
         let probes = Probes::new(&bvh, &mesh, PROBES_APART * fineness.shortest, progress)?;
         let surroundings = Surroundings { mesh: &mesh, senders: &senders, optics: &optics };
-        let rays = GatheringRays { each: settings.indirect_rays as usize, together: MOST_GATHERING_RAYS };
+        let rays = GatheringRays { each: settings.indirect_rays as usize, together: settings.gathering_rays };
         let shines = |s: u32| {
             let own = patches.direct[s as usize] + patches.emission[s as usize];
             (own + mesh.mean_over(senders.all[s as usize], &sky)).max_element() > 0.0
         };
         let mut transport = Transport::cast(surroundings, &probes, rays, shines, settings.seed ^ 0x6a7, progress)?;
         let scale = settings.form_factor.scale() as f32;
+        let straight = sky.clone();
         sky.iter_mut().zip(transport.beyond()).for_each(|(sky, beyond)| *sky = (*sky + beyond) * scale);
         for (direct, &sender) in patches.direct.iter_mut().zip(&senders.all) {
             *direct += mesh.mean_over(sender, &sky);
@@ -298,14 +236,18 @@ impl Illumination {
         let leave = |irradiance: &[Vec3]| -> Vec<Vec3> {
             bounce(irradiance).iter().zip(&source).map(|(reflected, s)| *s + *reflected).collect()
         };
-        let left = MOST_RAYS_IN_ALL.saturating_sub(transport.rays() as usize);
-        transport.refine(&leave(&first), left, progress)?;
+        let left = leave(&first);
+        let further = (settings.gathering_rays / 2 * 3).saturating_sub(transport.rays() as usize);
+        transport.refine(&left, further, progress)?;
         let (irradiance, convergence) = solve(&transport, settings.residual)?;
         let leaving = leave(&irradiance);
         let found = Found { leaving: &leaving, irradiance: &irradiance, sky: &sky };
         let gathering_rays = transport.rays();
         let energy = patches.energy(&surroundings, &emitters, &transport, found, settings.seed);
-        let irradiance = irradiance.iter().zip(&weak).zip(&sky).map(|((i, w), s)| *i + *w + *s).collect();
+        let (found, side, jump) = transport.into_found(&leaving, scale);
+        let sky_side = sky::side(mesh.vertices.len());
+        let sampled = Sampled { probes, side, jump, found, sky: straight, sky_side };
+        let irradiance = irradiance.iter().zip(&weak).zip(&sky).map(|((i, w), s)| *i + w.0 + w.1 + *s).collect();
         let mut light = Self {
             settings,
             emitters,
@@ -317,6 +259,7 @@ impl Illumination {
             senders,
             leaving,
             irradiance,
+            sampled,
             report: IlluminationReport::default(),
         };
         light.report = IlluminationReport {
@@ -369,12 +312,18 @@ fn clear_views(lamps: Lamps, mesh: &Elements) -> Vec<VisibleEmitters> {
     each.collect()
 }
 
-/// Light of weak images at the vertices: irradiance over π.
-fn weak_light(lamps: Lamps, images: &Images, mesh: &Elements, seed: u64, progress: &Progress) -> Result<Vec<Vec3>> {
+/// Light of weak images at the vertices: irradiance over π of emitting surfaces, and of punctual lights.
+fn weak_light(
+    lamps: Lamps,
+    images: &Images,
+    mesh: &Elements,
+    seed: u64,
+    progress: &Progress,
+) -> Result<Vec<(Vec3, Vec3)>> {
     let offset = lamps.optics.bvh.offset();
     let found = mesh.vertices.par_iter().enumerate().map(|(index, vertex)| {
         if vertex.buried || progress.stopped() {
-            return Vec3::ZERO;
+            return (Vec3::ZERO, Vec3::ZERO);
         }
         images.weak(lamps, vertex.shading_point(offset), &mut Random::new(seed, index as u64))
     });
@@ -386,30 +335,4 @@ fn weak_light(lamps: Lamps, images: &Images, mesh: &Elements, seed: u64, progres
 fn may_scatter(material: &crate::scene::Material) -> bool {
     let metal = material.metallic >= 1.0 && material.metallic_roughness_texture.is_none();
     material.base_color.max_element() > 0.0 && !metal && material.transmission < 1.0
-}
-
-impl IlluminationSettings {
-    fn check(&self) -> Result<()> {
-        let within = |name: &'static str, value: f64, low: f64, high: f64| {
-            if value >= low && value <= high {
-                Ok(())
-            } else {
-                Err(Error::out_of_range(name, value, format!("must be {low} to {high}")))
-            }
-        };
-        within("residual", self.residual, 1e-7, 1.0)?;
-        within("longest element", self.longest_element, 1e-4, 1.0)?;
-        within("shortest element", self.shortest_element, 1e-5, self.longest_element)?;
-        within("nearness", self.nearness, 0.01, 100.0)?;
-        within("shadow rays", f64::from(self.shadow_rays), 1.0, 1e6)?;
-        within("penumbra rays", f64::from(self.penumbra_rays), 0.0, 1e6)?;
-        within("indirect rays", f64::from(self.indirect_rays), 16.0, 1e6)?;
-        // Their table takes some 100 bytes each.
-        within("photons", f64::from(self.photons), 0.0, 2e7)?;
-        within("bounces", f64::from(self.bounces), 0.0, 1000.0)?;
-        if let Some(rays) = self.final_gather {
-            within("final gather", f64::from(rays), 1.0, 1e6)?;
-        }
-        Ok(())
-    }
 }

@@ -1,11 +1,12 @@
 //! What patches of the mesh do to light, what they get of it first, and where it goes.
 
 use super::IlluminationSettings;
-use super::elements::{Elements, PIECES, Part, Sender, Senders};
+use super::elements::{Elements, Sender, Senders};
 use super::emitters::{Emitters, ShadowRays, VisibleEmitters};
 use super::images::Images;
 use super::lamp_image::Lamps;
 use super::photons::Photon;
+use super::pieces::{PIECES, Part};
 use super::radiosity::{RayEnd, Surroundings};
 use super::surface::Surface;
 use super::transport::Transport;
@@ -26,6 +27,8 @@ const EVEN_ABOUT: f32 = 0.5;
 /// Not at patches smaller than this part of the shortest edge that is split: those of a file's fine triangles, many of which
 /// together have an even share of light and shadow.
 const SMALL: f64 = 0.4;
+/// Places along a side of a piece that the edge of a sun's light crosses.
+const ALONG_EDGES: u8 = 8;
 /// Fewest shadow rays of a place.
 const LEAST_SHADOW_RAYS: u32 = 4;
 
@@ -36,6 +39,7 @@ pub(crate) struct Patches {
     pub(crate) emission: Vec<Vec3>,
     /// Irradiance over π from lamps, straight or by way of optics.
     pub(crate) direct: Vec<Vec3>,
+    /// What of that comes from punctual lights: it counts as emitted where it arrives.
     punctual: Vec<Vec3>,
 }
 
@@ -50,8 +54,8 @@ pub(crate) struct Found<'a> {
     pub(crate) sky: &'a [Vec3],
 }
 
-/// What is found at a place: albedo, direct light, punctual light, emission.
-type Place = [Vec3; 4];
+/// What is found at a place: albedo, direct light, punctual light, emission, and the bright part of the environment.
+type Place = [Vec3; 5];
 
 /// What is found on a leaf, or on a corner's share of it.
 enum Seen {
@@ -102,9 +106,11 @@ impl Patches {
                 .environment
                 .as_ref()
                 .map_or(Vec3::ZERO, |around| sky::bright(around, optics, at, rays, random) * emitters.scale());
-            let direct = areas + points + sky + images.strong(lamps, at, rays, random);
+            let (mirrored, of_points) = images.strong(lamps, at, rays, random);
+            let points = points + of_points;
+            let direct = areas + points + sky + mirrored;
             let own = emitters.polygon(element.triangle).is_none();
-            [surface.albedo, direct, points + sky, if own { surface.emission } else { Vec3::ZERO }]
+            [surface.albedo, direct, points, if own { surface.emission } else { Vec3::ZERO }, sky]
         };
         let few = |(number, &sender): (usize, &Sender)| {
             progress.advance(1);
@@ -116,7 +122,8 @@ impl Patches {
             let mut random = Random::new(settings.seed ^ 0x1ea, number as u64);
             let places = mesh.places(sender);
             let seen: Vec<Place> = places.iter().map(|&at| look(sender, at, places.len(), &mut random)).collect();
-            let strengths = seen.iter().map(|place| place[1].element_sum());
+            // Soft light of an environment is none that has edges within a patch.
+            let strengths = seen.iter().map(|place| (place[1] - place[4]).element_sum());
             let range = strengths.fold([f32::INFINITY, 0.0f32], |[low, high], s| [low.min(s), high.max(s)]);
             Seen::Even(mean(seen), range)
         };
@@ -149,6 +156,15 @@ impl Patches {
             for &(place, piece) in &places {
                 pieces[usize::from(piece)].push(look(leaf, place, places.len(), &mut random));
             }
+            // The edge of a sun's light is sharp: a few places of a piece do not tell how much of it is lit.
+            for (piece, seen) in pieces.iter_mut().enumerate() {
+                let lit = seen.iter().map(|place| place[2].element_sum());
+                let [low, high] = lit.fold([f32::INFINITY, 0.0f32], |[l, h], s| [l.min(s), h.max(s)]);
+                if low < EVEN_ABOUT * high {
+                    let places = mesh.places_in(leaf.element, piece as u8, ALONG_EDGES);
+                    *seen = places.iter().map(|&place| look(leaf, place, places.len(), &mut random)).collect();
+                }
+            }
             *seen = Seen::Pieces(Box::new(pieces.map(mean)));
         });
         progress.check()?;
@@ -173,8 +189,19 @@ impl Patches {
             }
         }
         let column = |k: usize| found.iter().map(|f| f[k]).collect();
-        let patches = Self { albedo: column(0), direct: column(1), punctual: column(2), emission: column(3), area };
+        let punctual = found.iter().map(|f| f[2] + f[4]).collect();
+        let patches = Self { albedo: column(0), direct: column(1), punctual, emission: column(3), area };
         Ok((patches, senders))
+    }
+
+    /// Adds what is known at vertices: irradiance over π of surfaces' and of punctual lights' weak images.
+    pub(crate) fn add(&mut self, mesh: &Elements, senders: &Senders, weak: &[(Vec3, Vec3)]) {
+        let [areas, points]: [Vec<Vec3>; 2] = [weak.iter().map(|w| w.0).collect(), weak.iter().map(|w| w.1).collect()];
+        for (s, &sender) in senders.all.iter().enumerate() {
+            let of_points = mesh.mean_over(sender, &points);
+            self.direct[s] += mesh.mean_over(sender, &areas) + of_points;
+            self.punctual[s] += of_points;
+        }
     }
 
     /// Adds the light of photons to what senders get directly.
@@ -186,7 +213,9 @@ impl Patches {
             if let Some(sender) = mesh.sender(bvh, senders, element, weights) {
                 let sender = sender as usize;
                 if self.area[sender] > 0.0 {
-                    self.direct[sender] += photon.flux / (self.area[sender] * PI as f32);
+                    let light = photon.flux / (self.area[sender] * PI as f32);
+                    self.direct[sender] += light;
+                    self.punctual[sender] += if photon.is_of_point { light } else { Vec3::ZERO };
                 }
             }
         }

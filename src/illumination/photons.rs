@@ -10,16 +10,16 @@
 
 use super::elements::NONE;
 use super::emitter::Emitter;
-use super::emitters::punctual_light;
 use super::lamp_image::Lamps;
 use super::paths::{Continuation, Optics, Way};
+use super::punctual::{on_disc, punctual_light};
 use super::sampling::{spread, triangle_weights};
 use super::surface::ShadingPoint;
 use crate::error::Result;
 use crate::progress::Progress;
 use crate::random::Random;
-use crate::scene::PunctualLight;
 use crate::scene::bvh::{Meeting, Ray, Sides};
+use crate::scene::{LightKind, PunctualLight};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -41,6 +41,8 @@ pub(crate) struct Photon {
     pub(crate) barycentric: [f32; 2],
     /// Flux [W].
     pub(crate) flux: Vec3,
+    /// Whether a punctual light has sent it.
+    pub(crate) is_of_point: bool,
 }
 
 /// A lamp that aims.
@@ -114,7 +116,8 @@ pub(crate) fn shoot(lit: Lamps, count: u32, seed: u64, progress: &Progress) -> R
                 let place = spread(shift, shot);
                 let mut random = Random::new(seed ^ 0x9407 ^ ((number as u64) << 32), shot);
                 let aimed = lamp.aim(lit, &targets[k], place)?;
-                follow(lit.optics, aimed, 1.0 / (chance * shots as f64), &mut random)
+                let arrived = follow(lit.optics, aimed, 1.0 / (chance * shots as f64), &mut random)?;
+                Some(Photon { is_of_point: matches!(lamp, Lamp::Point(_)), ..arrived })
             })
             .collect();
         progress.check()?;
@@ -187,6 +190,10 @@ impl Lamp<'_> {
             Self::Point(light) => {
                 let towards = |normal| punctual_light(bvh.size(), light, ShadingPoint { position: at, normal });
                 let (strength, end) = towards(target.normal).or_else(|| towards(-target.normal))?;
+                let end = match light.kind {
+                    LightKind::Sun { radius } => on_disc(at, end, radius, [place[2], place[3]]),
+                    _ => end,
+                };
                 (end, strength * (std::f64::consts::PI * target.area) as f32)
             }
         };
@@ -246,6 +253,7 @@ fn follow(optics: &Optics, aimed: Aimed, share: f64, random: &mut Random) -> Opt
                 front: hit.front,
                 barycentric: meeting.barycentric,
                 flux,
+                is_of_point: false,
             });
         }
         meeting = bvh.meet(&ray, 0.0, f64::INFINITY, Sides::Both)?;

@@ -5,6 +5,7 @@ use super::emitters::ShadowRays;
 use super::radiosity::RayEnd;
 use super::{Illumination, LobeRay, Surface, sampling, sky};
 use crate::random::Random;
+use crate::scene::Environment;
 use crate::scene::bvh::{Hit, Ray};
 use glam::{DVec3, Vec3};
 
@@ -31,6 +32,11 @@ pub(crate) trait DiffuseLight {
 
     /// The part of what shines at a hit that is left to a ray into a lobe.
     fn part_of_lobe(&self, hit: &Hit, lobe: &LobeRay) -> f32;
+
+    /// Radiance from beyond the scene; a ray into a lobe has seen suns as glints before.
+    fn beyond(&self, around: &Environment, direction: DVec3, by_lobe: bool) -> Vec3 {
+        if by_lobe { around.smooth(direction) } else { around.radiance(direction) }
+    }
 }
 
 impl DiffuseLight for Illumination {
@@ -84,8 +90,8 @@ impl Illumination {
                 sky::bright(around, &self.optics, at, rays, random) * self.emitters.scale()
             });
         let rays = ShadowRays { first: rays.first.div_ceil(2), penumbra: rays.penumbra / 2, ..rays };
-        let mirrored = self.images.strong(self.lamps(), at, rays, random);
-        areas + points + mirrored + sky + self.caustics.light(surface.position, surface.facing)
+        let (mirrored, of_points) = self.images.strong(self.lamps(), at, rays, random);
+        areas + points + mirrored + of_points + sky + self.caustics.light(surface.position, surface.facing)
     }
 
     /// Irradiance over π that comes by way of other surfaces.
@@ -102,7 +108,7 @@ impl Illumination {
                 CUT_RAYS
             }
         };
-        let images = self.images.weak(self.lamps(), surface.shading_point(self.bvh().offset()), random);
+        let (images, of_points) = self.images.weak(self.lamps(), surface.shading_point(self.bvh().offset()), random);
         let sky = match &self.bvh().scene().environment {
             Some(around) => {
                 let side = f64::from(rays.div_ceil(share)).sqrt().ceil() as usize;
@@ -111,7 +117,7 @@ impl Illumination {
             }
             None => Vec3::ZERO,
         };
-        images + sky + self.gather(surface, f64::from(rays.div_ceil(share)).sqrt().ceil() as usize, random)
+        images + of_points + sky + self.gather(surface, f64::from(rays.div_ceil(share)).sqrt().ceil() as usize, random)
     }
 
     /// Indirect irradiance over π, gathered with `side`² rays from the mesh's radiosity.

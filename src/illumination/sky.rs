@@ -20,7 +20,7 @@ use std::f64::consts::FRAC_1_PI;
 /// Shadow rays of a vertex, at most and at least, and of all vertices together.
 const MOST: usize = 512;
 const LEAST: usize = 72;
-const TOGETHER: usize = 8_000_000;
+const TOGETHER: usize = 4_000_000;
 
 /// Irradiance over π that comes straight from the environment's plain part, by `2 side²` rays: half of them are drawn by its
 /// brightness, half by the cosine law, each weighted by how densely both draw its direction (Veach's balance heuristic).
@@ -46,10 +46,11 @@ pub(super) fn plain(around: &Environment, optics: &Optics, at: ShadingPoint, sid
     sum / (side * side) as f32
 }
 
-/// Rays that do not agree to this part of their mean are not enough.
-const UNSURE: f64 = 0.03;
+/// Sets of rays that are tried where all of a set go below the horizon.
+const MOST_SETS: usize = 8;
 
-/// Irradiance over π that comes straight from the environment's bright part.
+/// Irradiance over π that comes straight from the environment's bright part: what would arrive if nothing stood in the way,
+/// times the part of it that does, Σ w v / Σ w over rays drawn by brightness; more rays where the first ones disagree.
 pub(super) fn bright(
     around: &Environment,
     optics: &Optics,
@@ -57,31 +58,38 @@ pub(super) fn bright(
     rays: ShadowRays,
     random: &mut Random,
 ) -> Vec3 {
-    let Some(dome) = around.bright() else { return Vec3::ZERO };
+    let Some(lamps) = around.bright() else { return Vec3::ZERO };
+    let unhindered = lamps.unhindered(at.normal);
+    if unhindered.max_element() <= 0.0 {
+        return Vec3::ZERO;
+    }
+    let (mut sent, mut arrived) = (DVec3::ZERO, DVec3::ZERO);
     let mut cast = |side: usize| {
-        let (mut sum, mut squares) = (DVec3::ZERO, 0.0);
         for cell in 0..side * side {
-            let drawn = dome.drawn(stratum(cell, side, random));
+            let drawn = lamps.drawn(stratum(cell, side, random));
             let cosine = drawn.direction.dot(at.normal);
             if cosine > 0.0 {
-                let light = drawn.texel * left(optics, at, drawn.direction);
-                let light = light.as_dvec3() * (cosine * FRAC_1_PI / drawn.density);
-                sum += light;
-                squares += light.element_sum().powi(2);
+                let light = drawn.texel.as_dvec3() * (cosine / drawn.density);
+                sent += light;
+                arrived += light * left(optics, at, drawn.direction).as_dvec3();
             }
         }
-        (sum, squares)
+        [sent, arrived].map(|light| light.element_sum())
     };
     let side = |rays: u32| f64::from(rays).sqrt().ceil() as usize;
-    let count = (side(rays.first) * side(rays.first)) as f64;
-    let (sum, squares) = cast(side(rays.first));
-    let mean = sum.element_sum() / count;
-    let error = ((squares / count - mean * mean).max(0.0) / count).sqrt();
-    if rays.penumbra == 0 || error <= UNSURE * mean {
-        return (sum / count).as_vec3();
+    let mut found = cast(side(rays.first));
+    for _ in 0..MOST_SETS {
+        if found[0] > 0.0 {
+            break;
+        }
+        found = cast(side(rays.first));
     }
-    let more = side(rays.penumbra);
-    ((sum + cast(more).0) / (count + (more * more) as f64)).as_vec3()
+    let [all, some] = found;
+    if rays.penumbra > 0 && some > 0.0 && some < all * (1.0 - 1e-6) {
+        cast(side(rays.penumbra));
+    }
+    let part = DVec3::from_array(std::array::from_fn(|c| if sent[c] > 0.0 { arrived[c] / sent[c] } else { 0.0 }));
+    unhindered * part.as_vec3()
 }
 
 /// A place in a cell of a lattice of `side` × `side` on the unit square.
@@ -94,11 +102,16 @@ fn left(optics: &Optics, at: ShadingPoint, direction: DVec3) -> Vec3 {
     optics.transmittance(at.position, at.position + direction * (2.0 * optics.bvh.size()))
 }
 
+/// So many samples, squared, at each of so many vertices.
+pub(super) fn side(vertices: usize) -> usize {
+    let rays = (TOGETHER / vertices.max(1)).clamp(LEAST, MOST);
+    (0.5 * rays as f64).sqrt() as usize
+}
+
 /// The same at all vertices of the mesh.
 pub(super) fn at_vertices(optics: &Optics, mesh: &Elements, seed: u64, progress: &Progress) -> Result<Vec<Vec3>> {
     let Some(around) = &optics.scene().environment else { return Ok(vec![Vec3::ZERO; mesh.vertices.len()]) };
-    let rays = (TOGETHER / mesh.vertices.len().max(1)).clamp(LEAST, MOST);
-    let side = (0.5 * rays as f64).sqrt() as usize;
+    let side = side(mesh.vertices.len());
     progress.start("light of the environment", mesh.vertices.len() as u64);
     let offset = optics.bvh.offset();
     let found = mesh.vertices.par_iter().enumerate().map(|(index, vertex)| {
@@ -119,7 +132,7 @@ mod tests {
     use crate::illumination::{Illumination, IlluminationSettings, Surface};
     use crate::progress::Progress;
     use crate::random::Random;
-    use crate::scene::{Environment, Material, Ray, SceneBvh, Sides};
+    use crate::scene::{Environment, LightKind, Material, PunctualLight, Ray, SceneBvh, Sides};
     use glam::{DVec3, Vec3};
     use std::sync::Arc;
 
@@ -187,5 +200,56 @@ mod tests {
         // Beside the sun there is the sky, a tenth of it; under the sheet only what comes in from aside.
         assert!(seen[..3].iter().all(|s| (s.x / lit - 1.0).abs() < 0.1), "{lit} {seen:?}");
         assert!(seen[3..].iter().all(|s| s.x / lit < 0.1), "{lit} {seen:?}");
+    }
+
+    #[test]
+    fn the_shadow_of_an_edge_is_as_soft_as_the_sun_is_wide() {
+        // A sheet at height h whose edge lies across the way of a sun at the zenith: light rises over 2·h·radius beneath it.
+        let (height, radius) = (0.5, 0.05);
+        let mut room = plate(Material::diffuse(Vec3::ONE));
+        let black = room.material(Material { double_sided: true, ..Material::diffuse(Vec3::ZERO) });
+        room.quad(DVec3::new(0.0, height, -1.0), DVec3::X, DVec3::Z * 2.0, black);
+        room.scene.lights.push(PunctualLight {
+            kind: LightKind::Sun { radius: radius as f32 },
+            position: Vec3::ZERO,
+            direction: Vec3::NEG_Y,
+            intensity: Vec3::splat(std::f32::consts::PI),
+            range: f32::INFINITY,
+        });
+        let bvh = SceneBvh::new(room.scene);
+        let settings =
+            IlluminationSettings { shadow_rays: 1024, penumbra_rays: 16_384, ..IlluminationSettings::default() };
+        let light = Illumination::new(bvh, settings, &Progress::new()).expect("light");
+        for part in [-1.2, -0.6, -0.2, 0.0, 0.4, 0.8, 1.2f64] {
+            // The disc's share on the left of a line at `part` of its radius.
+            let x = part.clamp(-1.0, 1.0);
+            let exact = 0.5 - (x * (1.0 - x * x).sqrt() + x.asin()) / std::f64::consts::PI;
+            let place = DVec3::new(part * height * radius, 0.1, 0.03);
+            let ray = Ray { origin: place, direction: DVec3::NEG_Y };
+            let hit = light.bvh().nearest(&ray, 0.0, Sides::Front).expect("floor");
+            let surface = Surface::at(light.bvh().scene(), &hit, 0.0);
+            let seen = f64::from(light.radiance(&hit, &surface, 1, &mut Random::new(7, 0)).x);
+            assert!((seen - exact).abs() < 0.02, "{part}: {seen}, not {exact}");
+        }
+        assert!(light.report().energy.imbalance().abs() < 3e-3, "{:?}", light.report().energy);
+    }
+
+    #[test]
+    fn sun_and_rough_metal_keep_the_balance_of_energy() {
+        let mut room = plate(Material::diffuse(Vec3::splat(0.7)));
+        let metal = Material { metallic: 1.0, roughness: 0.4, ..Material::diffuse(Vec3::new(1.0, 0.85, 0.5)) };
+        let metal = room.material(metal);
+        room.sphere(DVec3::new(0.0, 0.3, 0.0), 0.3, false, 24, metal);
+        room.scene.lights.push(PunctualLight {
+            kind: LightKind::Sun { radius: 5e-3 },
+            position: Vec3::ZERO,
+            direction: Vec3::new(0.5, -0.9, -0.3).normalize(),
+            intensity: Vec3::splat(20.0),
+            range: f32::INFINITY,
+        });
+        let bvh = SceneBvh::new(room.scene);
+        let light = Illumination::new(bvh, IlluminationSettings::default(), &Progress::new()).expect("light");
+        assert!(light.report().photons > 1000, "{:?}", light.report());
+        assert!(light.report().energy.imbalance().abs() < 3e-3, "{:?}", light.report().energy);
     }
 }

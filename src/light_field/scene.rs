@@ -179,7 +179,6 @@ mod tests {
     use super::*;
     use crate::illumination::IlluminationSettings;
     use crate::illumination::test_rooms::Room;
-    use crate::points::eye::LOBE_RAYS;
     use crate::points::{Channel, Placement, SceneSettings};
     use crate::scene::{Camera, Material, gltf};
     use glam::DVec3;
@@ -276,7 +275,7 @@ mod tests {
         let footprint = Footprint { start: 0.0, growth: 0.0 };
         let (bvh, mirror_depth) = (lit.illumination().bvh(), MirrorDepth::Path);
         let light = lit.illumination();
-        let looks = Looks { light, bvh, footprint, bounces: 32, mirror_depth, lobe_rays: LOBE_RAYS };
+        let looks = Looks { light, bvh, footprint, bounces: 32, mirror_depth, lobe_rays: 16.0 };
         let (mut difference, mut bias, mut count) = (0.0, Vec3::ZERO, 0.0);
         let mut found = Found::default();
         for index in 0..2 {

@@ -297,7 +297,7 @@ impl Studio {
 
     /// The settings of a level.
     fn scene_at(&self, detail: Detail) -> SceneSettings {
-        let mut settings = self.settings.scene.clone();
+        let mut settings = SceneSettings { estimate: false, ..self.settings.scene.clone() };
         let trace = &settings.trace;
         let (width, height) = (f64::from(trace.width), f64::from(trace.height));
         let scale = match detail {

@@ -13,8 +13,6 @@ use crate::scene::bvh::{Ray, SceneBvh, Sides};
 use crate::scene::{Camera, Projection};
 use glam::{DVec3, Vec3};
 
-/// Rays into the lobe of a rough surface that reflects everything; fewer where it reflects less.
-pub(crate) const LOBE_RAYS: f32 = 16.0;
 /// Ways that bring less than this part of a white surface's light are followed by chance.
 const FAINT: f32 = 0.01;
 /// Ways followed at once; further ones are chosen from by chance.
@@ -103,7 +101,7 @@ pub(crate) struct Looks<'a, L> {
     pub(crate) bounces: u32,
     /// Where points stand that are seen by way of optics.
     pub(crate) mirror_depth: MirrorDepth,
-    /// Rays into the lobe of a rough surface that reflects everything, [`LOBE_RAYS`] unless many looks are averaged.
+    /// Rays into the lobe of a rough surface that reflects everything: few where many looks are averaged.
     pub(crate) lobe_rays: f32,
 }
 
@@ -159,7 +157,8 @@ impl<'a> Eye<'a> {
             Projection::Orthographic { .. } => Footprint { start: pixel, growth: 0.0 },
         };
         let (bounces, mirror_depth) = (settings.bounces, settings.mirror_depth);
-        let looks = Looks { light, bvh: light.bvh(), footprint, bounces, mirror_depth, lobe_rays: LOBE_RAYS };
+        let looks =
+            Looks { light, bvh: light.bvh(), footprint, bounces, mirror_depth, lobe_rays: settings.lobe_rays as f32 };
         Self { camera, settings, aspect, looks }
     }
 
@@ -167,6 +166,12 @@ impl<'a> Eye<'a> {
     pub(crate) fn ray(&self, column: f64, row: f64) -> Ray {
         let (u, v) = (column / f64::from(self.settings.width), row / f64::from(self.settings.height));
         self.camera.ray(u, v, self.aspect)
+    }
+
+    /// The same looks at other light on the same surfaces.
+    pub(crate) fn looks_at<'b, L>(&'b self, light: &'b L) -> Looks<'b, L> {
+        let Looks { bvh, footprint, bounces, mirror_depth, lobe_rays, .. } = self.looks;
+        Looks { light, bvh, footprint, bounces, mirror_depth, lobe_rays }
     }
 
     /// Follows the ray through a place of the picture.
@@ -308,8 +313,7 @@ impl<L: DiffuseLight> Looks<'_, L> {
     fn leave(&self, mut branch: Branch, seen: &mut RaySample, groups: &mut u16) {
         let Some(around) = self.bvh.scene().environment.as_ref().filter(|_| branch.bent) else { return };
         let direction = branch.ray.direction;
-        let radiance =
-            branch.weight * if branch.lobe.is_some() { around.smooth(direction) } else { around.radiance(direction) };
+        let radiance = branch.weight * self.light.beyond(around, direction, branch.lobe.is_some());
         let group = branch.group.unwrap_or_else(|| next(groups));
         // Its image in a curved mirror or in glass is near; that in a flat one is put as far away as the scene is large.
         let size = self.bvh.size();

@@ -1,6 +1,7 @@
 //! A scene in its light, and the points that it becomes before a panel.
 
 use super::budget::{Budget, Rays};
+use super::light_error::light_error;
 use super::placement::{Phase, SequenceAnchors, WorldPoint};
 use super::trace::{self, TraceReport, TraceSettings};
 use super::{Placed, Placement, SceneView, WhiteLevel, WhitePoint, place};
@@ -33,6 +34,8 @@ pub struct SceneSettings {
     pub white: WhitePoint,
     /// What a sequence of frames keeps fixed.
     pub anchors: SequenceAnchors,
+    /// Whether the error of the picture's light is estimated.
+    pub estimate: bool,
 }
 
 impl Default for SceneSettings {
@@ -46,6 +49,7 @@ impl Default for SceneSettings {
             phase: Phase::Random { seed: 1 },
             white: WhitePoint::Unlimited,
             anchors: SequenceAnchors::default(),
+            estimate: false,
         }
     }
 }
@@ -74,6 +78,9 @@ pub struct ScenePoints {
     pub rays: Option<Rays>,
     /// White, and what is brighter.
     pub white: WhiteLevel,
+    /// Root mean square error of the light over blocks of 5 × 5 rays, over its mean, as far as it is noise; where it was
+    /// asked for, and enough is seen to tell.
+    pub light_error: Option<f64>,
     /// What had to be assumed.
     pub warnings: Vec<String>,
 }
@@ -176,6 +183,12 @@ impl LitScene {
             };
             return Err(Error::input(&self.path, what));
         }
+        let light_error = if settings.estimate {
+            let rays = TraceSettings { width: traced.width, height: traced.height, ..settings.trace };
+            light_error(light, &placing.camera, &rays, progress)?
+        } else {
+            None
+        };
         let mut world = traced.world_points();
         let white = settings.white.apply(&mut world, &traced.picture)?;
         let placing = placing.fixed_by(&world);
@@ -183,6 +196,6 @@ impl LitScene {
         let view = SceneView::new(&traced, &placed, placing);
         let warnings = self.loaded.warnings.iter().map(ToString::to_string).collect();
         let illumination = *light.report();
-        Ok(ScenePoints { placed, world, view, illumination, trace: traced.report, rays, white, warnings })
+        Ok(ScenePoints { placed, world, view, illumination, trace: traced.report, rays, white, light_error, warnings })
     }
 }

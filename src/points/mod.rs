@@ -35,6 +35,7 @@ mod from_scene;
 mod gather;
 pub mod images;
 pub mod lattice;
+mod light_error;
 #[cfg(test)]
 mod odd_tests;
 mod placed;
@@ -55,6 +56,7 @@ pub(crate) mod white;
 pub use axes::Axes;
 pub use exposure::{Exposure, Share};
 pub use from_scene::{LitScene, ScenePoints, SceneSettings};
+pub use light_error::light_error;
 pub use placed::{Placed, place};
 pub use placement::Placement;
 pub use placing_cloud::PlacedCloud;

@@ -1,5 +1,6 @@
 //! How rays are cast.
 
+use crate::illumination::Quality;
 use crate::names::{Name, Named};
 
 /// At which distance a point stands that is seen by way of mirrors or glass.
@@ -31,6 +32,8 @@ pub struct TraceSettings {
     pub bounces: u32,
     /// Sub-rays along each side of a pixel that covers an edge; 1 takes pixel centres only.
     pub edge_rays: u32,
+    /// Rays into the lobe of a rough surface that reflects everything; fewer where it reflects less.
+    pub lobe_rays: u32,
     /// Where points stand that are seen by way of optics.
     pub mirror_depth: MirrorDepth,
     /// Whether each pixel's ray goes through a random place of it instead of its middle: points that are few then stand in
@@ -47,9 +50,21 @@ impl Default for TraceSettings {
             height: 500,
             bounces: 32,
             edge_rays: 3,
+            lobe_rays: 16,
             mirror_depth: MirrorDepth::Focus,
             jitter: false,
             seed: 1,
         }
+    }
+}
+
+impl TraceSettings {
+    /// The same with rays for this error of the picture's light, as [`crate::illumination::IlluminationSettings::for_error`].
+    pub fn for_error(self, error: f64) -> Self {
+        let finer = Quality::Normal.error() / error;
+        let usual = Self::default();
+        let lobe_rays = (f64::from(usual.lobe_rays) * finer * finer).round().clamp(4.0, 256.0) as u32;
+        let edge_rays = (f64::from(usual.edge_rays) * finer.sqrt()).round().clamp(2.0, 8.0) as u32;
+        Self { lobe_rays, edge_rays, ..self }
     }
 }

@@ -166,16 +166,19 @@ fn place(pixel: u32, settings: &TraceSettings) -> [f64; 2] {
 
 /// Whether a pixel and a neighbour show different things: other surfaces, or a crease between them.
 fn is_edge(seen: &[RaySample], pixel: usize, width: usize) -> bool {
-    let here = &seen[pixel];
-    let differs = |other: &RaySample| {
-        let depth = (other.depth - here.depth).abs() > 0.02 * here.depth.min(other.depth);
-        let crease = other.first != here.first && other.normal.dot(here.normal) < 0.99;
-        (other.depth > 0.0) != (here.depth > 0.0) || other.bounces != here.bounces || depth || crease || {
-            let (a, b) = (here.radiance.max_element(), other.radiance.max_element());
-            (a - b).abs() > 0.5 * a.max(b)
-        }
-    };
-    neighbours(pixel, width, seen.len()).any(|other| differs(&seen[other]))
+    neighbours(pixel, width, seen.len()).any(|other| differ(&seen[pixel], &seen[other]))
+}
+
+/// Whether two neighbouring pixels show different things.
+pub(super) fn differ(here: &RaySample, other: &RaySample) -> bool {
+    let depth = (other.depth - here.depth).abs() > 0.02 * here.depth.min(other.depth);
+    let crease = other.first != here.first && other.normal.dot(here.normal) < 0.99;
+    let [a, b] = [here, other].map(|seen| seen.radiance.max_element());
+    (other.depth > 0.0) != (here.depth > 0.0)
+        || other.bounces != here.bounces
+        || depth
+        || crease
+        || (a - b).abs() > 0.5 * a.max(b)
 }
 
 /// Pixels to the left, to the right, above and below one of a picture of `count` pixels.

@@ -5,6 +5,7 @@ use super::plate::{Binarisation, Plate};
 use super::plate_size::{Asked, PlateSize};
 use super::source::PictureDepths;
 use crate::names::Named;
+use crate::scene::environment::Sky;
 use crate::segments::{PointPhase, SceneOptions};
 use crate::units::show_length;
 use std::path::Path;
@@ -55,9 +56,14 @@ pub(super) fn command(settings: &Settings, folder: &Path) -> String {
         }
         None => words.push(quoted(&format!("{}.toml", plate.name))),
     }
-    let SceneOptions { camera, animation, time, viewer_light, allow_outside, environment, bounces, photons, white } =
-        settings.options();
+    let options = settings.options();
+    let SceneOptions { camera, animation, time, viewer_light, allow_outside, environment, sky, .. } = options;
+    let SceneOptions { bounces, photons, light_error, white, .. } = options;
     let usual = SceneOptions::default();
+    // Its value must stand in the same word.
+    words.extend(sky.map(|Sky { elevation, azimuth, turbidity, .. }| {
+        format!("--sky={}deg,{}deg,{turbidity}", elevation.to_degrees(), azimuth.to_degrees())
+    }));
     let mut flag = |name: &str, value: Option<String>| {
         if let Some(value) = value {
             words.push(format!("--{name}"));
@@ -72,7 +78,9 @@ pub(super) fn command(settings: &Settings, folder: &Path) -> String {
     let around = environment.as_ref();
     flag("environment", around.map(|panorama| panorama.path.display().to_string()));
     flag("environment-turn", around.filter(|p| p.turn != 0.0).map(|p| format!("{}deg", p.turn.to_degrees())));
-    flag("environment-strength", around.filter(|p| p.strength != 1.0).map(|p| p.strength.to_string()));
+    let strength = around.map(|panorama| panorama.strength).or(sky.map(|sky| sky.strength));
+    flag("environment-strength", strength.filter(|strength| *strength != 1.0).map(|strength| strength.to_string()));
+    flag("light-error", (light_error != usual.light_error).then(|| format!("{}%", 100.0 * light_error)));
     flag("bounces", (bounces != usual.bounces).then(|| bounces.to_string()));
     flag("photons", (photons != usual.photons).then(|| photons.to_string()));
     flag("white", white.map(|white| if white == f32::MAX { "none".into() } else { white.to_string() }));

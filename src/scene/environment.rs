@@ -3,14 +3,22 @@
 //! A panorama is a map of longitude and latitude, as renderers and panorama cameras write it: its middle looks along +x, to
 //! the right of it lies +z, and its upper edge is straight up, +y. What is small and bright in it, such as a sun, is taken
 //! out as parallel light of its own, so that it throws sharp shadows; the rest is smooth enough to be sampled.
+//!
+//! Two are made here: a studio for files without light, and sun and sky.
 
+mod bright;
 mod dome;
 mod file;
+mod sky;
+mod studio;
 mod suns;
+
+pub(crate) use bright::Bright;
 
 pub(crate) use dome::Dome;
 use dome::{Map, turned};
 pub use file::Panorama;
+pub use sky::{CLEAR, Sky};
 
 use super::{LightKind, PunctualLight};
 use crate::error::{Error, Result};
@@ -36,10 +44,25 @@ pub struct Environment {
     /// All but the suns.
     smooth: Map,
     suns: Vec<PunctualLight>,
+    /// A sun that stands in no texel.
+    disc: Option<Disc>,
     /// The smooth part up to the limit of brightness, and what it has over that.
     plain: Dome,
-    bright: Option<Dome>,
+    bright: Option<Bright>,
     turn: f64,
+}
+
+/// A sun by what is known of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Disc {
+    /// Unit direction to it.
+    towards: DVec3,
+    /// Angular radius [rad].
+    radius: f64,
+    /// Of a surface square to it [W/m²].
+    irradiance: Vec3,
+    /// [W/(m² sr)]
+    radiance: Vec3,
 }
 
 impl Environment {
@@ -55,25 +78,32 @@ impl Environment {
             return Err(Error::parameter("environment", "has radiance below zero or without end".to_owned()));
         }
         let texels = texels.into_iter().map(|t| t.min(Vec3::splat(BRIGHTEST))).collect();
-        let whole = Map { width, height, texels };
+        Self::with_disc(Map { width, height, texels }, None, turn)
+    }
+
+    /// From a map that is whole, but for the sun that stands beside it; without one, suns are looked for in the map.
+    fn with_disc(whole: Map, disc: Option<Disc>, turn: f64) -> Result<Self> {
         let mut smooth = whole.coarser(SMOOTH);
-        let found = suns::taken_out(&mut smooth);
+        let found = if disc.is_some() { Vec::new() } else { suns::taken_out(&mut smooth) };
         let limit = BRIGHT * mean(&smooth).element_sum() / 3.0;
         let over = |t: Vec3| if t.max_element() > limit { t * (1.0 - limit / t.max_element()) } else { Vec3::ZERO };
         let bright = smooth.each(over);
         let plain = smooth.each(|t| t - over(t));
         let counts = mean(&bright).element_sum() > LEAST_BRIGHT * mean(&smooth).element_sum();
-        let suns = found.into_iter().map(|(direction, irradiance)| PunctualLight {
-            kind: LightKind::Directional,
+        let sun = |kind, direction: DVec3, intensity| PunctualLight {
+            kind,
             position: Vec3::ZERO,
             direction: (-turned(direction, turn)).as_vec3(),
-            intensity: irradiance,
+            intensity,
             range: f32::INFINITY,
-        });
+        };
+        let found = found.into_iter().map(|(towards, light)| sun(LightKind::Directional, towards, light));
+        let known = disc.map(|d| sun(LightKind::Sun { radius: d.radius as f32 }, d.towards, d.irradiance));
         Ok(Self {
-            suns: suns.collect(),
+            suns: found.chain(known).collect(),
+            disc,
             plain: Dome::new(if counts { plain } else { smooth.clone() }, turn),
-            bright: counts.then(|| Dome::new(bright, turn)),
+            bright: counts.then(|| Bright::new(bright, turn)),
             whole,
             smooth,
             turn,
@@ -103,7 +133,10 @@ impl Environment {
 
     /// Radiance from a unit direction, with all that is in the panorama.
     pub fn radiance(&self, direction: DVec3) -> Vec3 {
-        self.whole.at(turned(direction, -self.turn))
+        let local = turned(direction, -self.turn);
+        // By the chord: the cosine of so small an angle is too near to one.
+        let disc = self.disc.filter(|disc| (local - disc.towards).length() <= disc.radius);
+        self.whole.at(local) + disc.map_or(Vec3::ZERO, |disc| disc.radiance)
     }
 
     /// Radiance from a unit direction without the [`Environment::suns`].
@@ -118,7 +151,7 @@ impl Environment {
 
     /// What is brighter than most of it and too wide for a sun, such as windows and soft boxes, if there is any: its shadows are
     /// soft, and narrower than what is between two places of a mesh.
-    pub(crate) fn bright(&self) -> Option<&Dome> {
+    pub(crate) fn bright(&self) -> Option<&Bright> {
         self.bright.as_ref()
     }
 }
@@ -132,7 +165,10 @@ fn mean(map: &Map) -> Vec3 {
 impl PartialEq for Environment {
     /// Of the same light from everywhere.
     fn eq(&self, other: &Self) -> bool {
-        self.turn == other.turn && self.size() == other.size() && self.whole.texels == other.whole.texels
+        self.turn == other.turn
+            && self.disc == other.disc
+            && self.size() == other.size()
+            && self.whole.texels == other.whole.texels
     }
 }
 

@@ -83,6 +83,11 @@ pub struct PunctualLight {
 pub enum LightKind {
     /// Parallel light from infinity.
     Directional,
+    /// The same from a disc, whose shadows are as soft as it is wide.
+    Sun {
+        /// Angular radius [rad].
+        radius: f32,
+    },
     /// Equal in all directions.
     Point,
     /// A point at an eye: as [`LightKind::Point`], and through the backs of one-sided surfaces, as the eye sees.

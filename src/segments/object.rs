@@ -4,11 +4,11 @@ use super::plane::Segments;
 use super::scene::PlacedScene;
 use super::slit::{LinePoint, Strip};
 use crate::error::{Error, Result};
-use crate::illumination::{Illumination, IlluminationSettings};
+use crate::illumination::{Illumination, IlluminationSettings, Quality};
 use crate::points::colour::Lasers;
 use crate::points::{Channel, PointCloud, PointSource, clouds, ply};
 use crate::progress::Progress;
-use crate::scene::environment::Panorama;
+use crate::scene::environment::{Panorama, Sky};
 use crate::scene::{SceneBvh, gltf};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -41,10 +41,16 @@ pub struct SceneOptions {
     /// What lights the scene from all around.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub environment: Option<Panorama>,
+    /// Sun and sky instead of that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sky: Option<Sky>,
     /// Most mirrors and glass surfaces on a path.
     pub bounces: u32,
     /// Photons for caustics.
     pub photons: u32,
+    /// The error that the light may have, root mean square over its mean.
+    #[serde(skip_serializing_if = "is_usual")]
+    pub light_error: f64,
     /// Radiance that is shown as white [W/(m² sr)]; found from the middle of the view where `None`.
     pub white: Option<f32>,
 }
@@ -59,11 +65,18 @@ impl Default for SceneOptions {
             viewer_light: false,
             allow_outside: false,
             environment: None,
+            sky: None,
             bounces,
             photons,
+            light_error: Quality::Normal.error(),
             white: None,
         }
     }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref)] // as serde calls it
+fn is_usual(error: &f64) -> bool {
+    *error == Quality::Normal.error()
 }
 
 /// Whether a file is a point cloud, and no scene.
@@ -91,13 +104,15 @@ impl Object {
             viewer_light: options.viewer_light,
             allow_outside: options.allow_outside,
             environment: options.environment.clone(),
+            sky: options.sky,
             ..gltf::LoadOptions::default()
         };
         let loaded = gltf::load(path, &load)?;
         let camera = loaded.scene.cameras.first().ok_or_else(|| Error::input(path, "has no camera"))?;
         let bvh = SceneBvh::new(loaded.scene.clone());
         let SceneOptions { bounces, photons, white, .. } = *options;
-        let settings = IlluminationSettings { bounces, photons, seed: plane.seed, ..IlluminationSettings::default() };
+        let usual = IlluminationSettings::default().for_error(options.light_error)?;
+        let settings = IlluminationSettings { bounces, photons, seed: plane.seed, ..usual };
         let light = Illumination::new(bvh, settings, progress)?;
         // What is unlit shines by itself, and nothing lights it.
         let unlit = light.bvh().scene().materials.iter().any(|material| material.unlit);

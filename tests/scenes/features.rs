@@ -266,17 +266,36 @@ fn without_light_a_stated_one_stands_in() {
     let mut file = Builder::triangle();
     file.json["materials"] = json!([{"pbrMetallicRoughness": {"metallicFactor": 0}}]);
     let loaded = file.load().expect("loads");
-    assert!(warns(&loaded, "no light"));
-    let [key, fill] = loaded.scene.lights.as_slice() else { panic!("two lights stand in") };
-    assert_eq!((key.kind, fill.kind), (LightKind::Directional, LightKind::Eye));
-    // The key light falls on what the camera sees; the fill light's irradiance at the middle is what is stated.
-    let view = loaded.scene.cameras[0].ray(0.5, 0.5, 1.0).direction.as_vec3();
-    assert!(key.direction.dot(view) > 0.3 && key.direction.y < 0.0);
-    let (low, high) = loaded.scene.bounds().expect("bounds");
-    let distance = fill.position.distance((0.5 * (low + high)).as_vec3());
-    assert!((fill.intensity.x / distance.powi(2) - 0.8).abs() < 1e-4);
+    assert!(warns(&loaded, "no light") && warns(&loaded, "studio"));
+    // Its key stands where the viewer's upper left is, and is brighter than what is at the lower right.
+    let around = loaded.scene.environment.as_ref().expect("a studio");
+    let axis = |a: DVec3| loaded.scene.cameras[0].world_from_camera.transform_vector3(a).normalize();
+    let at = |a: DVec3| around.radiance(axis(a)).x;
+    assert!(at(DVec3::new(-0.5, 0.8, 0.6)) > 10.0 * at(DVec3::new(0.5, -0.8, 0.6)), "{}", around.mean());
+    assert!(loaded.scene.lights.is_empty());
 
-    // On request it is added to a file's own light, without a word.
+    // Inside of walls it would be dark: there the light comes from the camera.
+    let mut room = Builder::empty();
+    room.push("materials", json!({"pbrMetallicRoughness": {"metallicFactor": 0}, "doubleSided": true}));
+    let corner = |i: u32| [i & 1, i >> 1 & 1, i >> 2].map(|bit| 2.0 * bit as f32 - 1.0);
+    let corners: Vec<f32> = (0..8).flat_map(corner).collect();
+    let walls = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+    let indices: Vec<u16> = walls.iter().flat_map(|[a, b, c, d]| [*a, *b, *c, *a, *c, *d]).collect();
+    let mesh = room.mesh(&corners, &indices, 0);
+    room.node(json!({"mesh": mesh}));
+    room.push("cameras", json!({"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.01}}));
+    room.node(json!({"camera": 0}));
+    let inside = room.load().expect("loads");
+    assert!(warns(&inside, "walls") && inside.scene.environment.is_none(), "{:?}", inside.warnings);
+    let [key, fill] = inside.scene.lights.as_slice() else { panic!("two lights stand in") };
+    assert_eq!((key.kind, fill.kind), (LightKind::Directional, LightKind::Eye));
+    // The key light falls on what the camera sees; the fill light's irradiance at the middle is what is stated, for half the
+    // diagonal, since the camera stands there.
+    let view = inside.scene.cameras[0].ray(0.5, 0.5, 1.0).direction.as_vec3();
+    assert!(key.direction.dot(view) > 0.3 && key.direction.y < 0.0);
+    assert!((fill.intensity.x / 3.0 - 0.8).abs() < 1e-4);
+
+    // On request light from the viewer is added to a file's own, without a word.
     let own = Builder::triangle().load().expect("an emitter").scene;
     let options = LoadOptions { viewer_light: true, ..LoadOptions::default() };
     let both = Builder::triangle().load_with(&options).expect("an emitter");
@@ -285,7 +304,7 @@ fn without_light_a_stated_one_stands_in() {
     // What is unlit shows without light.
     file.json["materials"] = json!([{"extensions": {"KHR_materials_unlit": {}}}]);
     let unlit = file.load().expect("loads");
-    assert!(unlit.scene.lights.is_empty() && unlit.scene.materials[0].unlit && !warns(&unlit, "no light"));
+    assert!(unlit.scene.lights.is_empty() && unlit.scene.environment.is_none() && !warns(&unlit, "no light"));
 }
 
 #[test]

@@ -40,7 +40,7 @@ pub(crate) use parse::position;
 pub(crate) use parse::{LampAsked, Wavelengths, White};
 pub(crate) use placement::{DepthMapArgs, PlacementArg, PlacementArgs};
 pub(crate) use print::{ExportArgs, LookArgs, PreviewArgs, PrintArgs, PrintCommand, SheetArgs, VerifyArgs};
-pub(crate) use scene::{FileArgs, SceneArgs};
+pub(crate) use scene::{FileArgs, QualityArgs, SceneArgs};
 pub(crate) use serve::{ServeArgs, ServedLevelsArg};
 pub(crate) use show::{DEFAULT_OUTPUT, ShowArgs};
 pub(crate) use steps::{ComputeArgs, EncodeArgs, PointsArgs, PropagateArgs, ReconstructArgs};

@@ -2,6 +2,7 @@
 
 use crate::names::Named;
 use crate::points::budget::Budget;
+use crate::scene::environment::{CLEAR, Sky};
 use crate::{Result, units};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
@@ -49,6 +50,27 @@ pub(super) fn angles(text: &str) -> Result<[f64; 2]> {
         Some((x, y)) => Ok([units::angle(x)?, units::angle(y)?]),
         None => Ok([units::angle(text)?, 0.0]),
     }
+}
+
+/// A part of a hundred.
+pub(super) fn percent(text: &str) -> Result<f64, String> {
+    let number = text.strip_suffix('%').and_then(|number| number.trim().parse::<f64>().ok()).filter(|n| n.is_finite());
+    number.map(|n| n / 100.0).ok_or_else(|| format!("`{text}` is not a percentage such as 1%"))
+}
+
+/// Elevation and azimuth of the sun, and haze.
+pub(super) fn sky(text: &str) -> Result<Sky, String> {
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    let (elevation, azimuth, haze) = match parts.as_slice() {
+        [elevation, azimuth] => (elevation, azimuth, None),
+        [elevation, azimuth, haze] => (elevation, azimuth, Some(haze)),
+        _ => return Err(format!("`{text}` is not elevation and azimuth such as 35deg,130deg")),
+    };
+    let angle = |text: &str| units::angle(text).map_err(|e| e.to_string());
+    let turbidity =
+        haze.map_or(Ok(CLEAR), |haze| haze.parse().map_err(|_| format!("`{haze}` is no number for haze")))?;
+    let sky = Sky { turbidity, ..Sky::clear(angle(elevation)?, angle(azimuth)?) };
+    sky.check().map(|()| sky).map_err(|e| e.to_string())
 }
 
 /// Three values with commas between them, or what an example of them is.

@@ -2,7 +2,7 @@
 
 use super::parse::{LampAsked, White, lamp, one_of, part, position, size, white};
 use super::placement::DepthMapArgs;
-use super::scene::FileArgs;
+use super::scene::{FileArgs, QualityArgs};
 use crate::print::export::Format;
 use crate::print::{Binarisation, PlateSize};
 use crate::segments::PointPhase;
@@ -67,9 +67,11 @@ pub(crate) struct PlateLightArgs {
     /// Most mirrors and glass surfaces on a path of light.
     #[arg(hide_short_help = true, long, default_value_t = 32, value_name = "N")]
     pub(crate) bounces: u32,
-    /// Photons that lamps send through curved mirrors and glass.
-    #[arg(hide_short_help = true, long, default_value_t = 400_000, value_name = "N")]
-    pub(crate) photons: u32,
+    #[command(flatten)]
+    pub(crate) quality: QualityArgs,
+    /// Photons that lamps send through curved mirrors and glass [default: by --quality; normal: 400000].
+    #[arg(hide_short_help = true, long, value_name = "N")]
+    pub(crate) photons: Option<u32>,
     /// Clip light brighter than white: auto, none, or a radiance [default: auto].
     #[arg(hide_short_help = true, long, value_parser = white, value_name = "WHITE")]
     pub(crate) white: Option<White>,

@@ -3,14 +3,14 @@
 use crate::errors::refused;
 use crate::panel::Panel;
 use crate::points::{Points, Source};
-use crate::quantities::{Length, named};
+use crate::quantities::{Angle, Length, named};
 use crate::run::run;
 use holodrive::illumination::IlluminationSettings;
 use holodrive::pipeline;
 use holodrive::points::budget::Budget;
 use holodrive::points::placement::Phase;
 use holodrive::points::{LitScene, Placement, SceneSettings, TraceSettings, WhitePoint};
-use holodrive::scene::environment::Panorama;
+use holodrive::scene::environment::{Panorama, Sky};
 use holodrive::scene::gltf::{Choice, Clip, File, LoadOptions};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -63,6 +63,7 @@ struct Asked {
     animation: Option<Which>,
     time: f64,
     environment: Option<PathBuf>,
+    sky: Option<(Angle, Angle)>,
     viewer_light: bool,
     bounces: u32,
     photons: Option<u32>,
@@ -71,7 +72,7 @@ struct Asked {
 
 impl Asked {
     fn settings(self) -> SceneSettings {
-        let Self { camera, animation, time, environment, viewer_light, bounces, photons, seed } = self;
+        let Self { camera, animation, time, environment, sky, viewer_light, bounces, photons, seed } = self;
         let usual = IlluminationSettings::default();
         SceneSettings {
             load: LoadOptions {
@@ -80,6 +81,7 @@ impl Asked {
                 time,
                 viewer_light,
                 environment: environment.map(|path| Panorama { path, strength: 1.0, turn: 0.0 }),
+                sky: sky.map(|(elevation, azimuth)| Sky::clear(elevation.0, azimuth.0)),
                 ..LoadOptions::default()
             },
             illumination: IlluminationSettings { bounces, photons: photons.unwrap_or(usual.photons), seed, ..usual },
@@ -122,14 +124,15 @@ impl Scene {
     /// :param animation: name or number of the clip that poses it; by default the first.
     /// :param time: time in the clip [s].
     /// :param environment: panorama (.hdr, .exr, picture) that lights it from all around.
-    /// :param viewer_light: adds the light of an unlit file to the file's own.
+    /// :param sky: the sun's (elevation, azimuth from +x towards +z) [rad, or text such as "35deg"]: sun and sky instead of that.
+    /// :param viewer_light: adds light from the viewer to the file's own.
     /// :param bounces: most mirrors or glass surfaces on one path.
     /// :param photons: photons by way of curved mirrors and glass; by default as the program does.
     /// :param seed: seed of all sampling.
     /// :param progress: see :func:`hologram`.
     #[staticmethod]
     #[pyo3(signature = (
-        path, *, camera = None, animation = None, time = 0.0, environment = None, viewer_light = false, bounces = 32,
+        path, *, camera = None, animation = None, time = 0.0, environment = None, sky = None, viewer_light = false, bounces = 32,
         photons = None, seed = 1, progress = None
     ))]
     #[expect(clippy::too_many_arguments)] // Python's keywords
@@ -140,13 +143,14 @@ impl Scene {
         animation: Option<Which>,
         time: f64,
         environment: Option<PathBuf>,
+        sky: Option<(Angle, Angle)>,
         viewer_light: bool,
         bounces: u32,
         photons: Option<u32>,
         seed: u64,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let asked = Asked { camera, animation, time, environment, viewer_light, bounces, photons, seed };
+        let asked = Asked { camera, animation, time, environment, sky, viewer_light, bounces, photons, seed };
         let settings = asked.settings();
         let lit = run(py, progress, |progress| pipeline::scene(&path, &settings, progress))?;
         Ok(Self { lit: Arc::new(lit), path, settings })
@@ -166,14 +170,15 @@ impl Scene {
     /// :param animation: name or number of the clip that poses it.
     /// :param time: time in the clip [s].
     /// :param environment: panorama (.hdr, .exr, picture) that lights it from all around.
-    /// :param viewer_light: adds the light of an unlit file to the file's own.
+    /// :param sky: the sun's (elevation, azimuth from +x towards +z) [rad, or text such as "35deg"]: sun and sky instead of that.
+    /// :param viewer_light: adds light from the viewer to the file's own.
     /// :param bounces: most mirrors or glass surfaces on one path.
     /// :param photons: photons by way of curved mirrors and glass.
     /// :param seed: seed of all sampling.
     /// :param progress: see :func:`hologram`.
     #[staticmethod]
     #[pyo3(signature = (
-        data, *, name = "bytes", camera = None, animation = None, time = 0.0, environment = None, viewer_light = false,
+        data, *, name = "bytes", camera = None, animation = None, time = 0.0, environment = None, sky = None, viewer_light = false,
         bounces = 32, photons = None, seed = 1, progress = None
     ))]
     #[expect(clippy::too_many_arguments)] // Python's keywords
@@ -185,13 +190,14 @@ impl Scene {
         animation: Option<Which>,
         time: f64,
         environment: Option<PathBuf>,
+        sky: Option<(Angle, Angle)>,
         viewer_light: bool,
         bounces: u32,
         photons: Option<u32>,
         seed: u64,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let asked = Asked { camera, animation, time, environment, viewer_light, bounces, photons, seed };
+        let asked = Asked { camera, animation, time, environment, sky, viewer_light, bounces, photons, seed };
         let (settings, path) = (asked.settings(), PathBuf::from(name));
         let lit = run(py, progress, |progress| {
             progress.start("scene", 0);

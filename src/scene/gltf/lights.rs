@@ -1,18 +1,19 @@
 //! Punctual lights of the file, and the light of a file that has none.
 
-use super::LoadOptions;
 use super::cameras::rigid;
 use super::document::Document;
 use super::meshes::UsedMaterials;
 use super::nodes::Nodes;
-use super::own_light::lit_share;
+use super::own_light::{is_open, lit_share};
+use super::{Choice, LoadOptions};
 use crate::error::Result;
-use crate::scene::{LightKind, Material, PunctualLight, Scene, TextureRef, Warning};
+use crate::scene::{Environment, LightKind, Material, PunctualLight, Scene, TextureRef, Warning};
 use glam::{DVec3, Vec3};
 use gltf::json;
 use json::extensions::scene::khr_lights_punctual::{Light, Type};
 use json::validation::Checked;
 use std::f32::consts::FRAC_PI_2;
+use std::sync::Arc;
 
 /// Irradiance of the directional light that stands in [W/m²].
 const KEY_IRRADIANCE: f32 = 2.2;
@@ -20,9 +21,10 @@ const KEY_IRRADIANCE: f32 = 2.2;
 /// Irradiance that the point light at the camera gives at the middle of the scene [W/m²].
 const FILL_IRRADIANCE: f32 = 0.8;
 
-/// What is said where the default light is added.
-const ADDED: &str = "it is lit by a directional light of 2.2 W/m² from the viewer's upper left and a point light at the \
-    camera that gives 0.8 W/m² at the middle of the scene";
+/// What is said where the default light is added: that of a studio, or from the viewer where walls keep a studio's light out.
+const STUDIO: &str = "it is lit by a soft studio (dome and soft boxes, from the viewer's upper left)";
+const VIEWER: &str = "its walls keep a studio's light out, so it is lit by a directional light of 2.2 W/m² from the viewer's \
+    upper left and a point light at the camera that gives 0.8 W/m² at the middle of the scene";
 
 /// Share of what the camera sees that a file's own emission must light.
 const LEAST_LIT: f64 = 0.25;
@@ -78,15 +80,24 @@ fn kind(document: &Document, light: &Light, what: &str) -> Result<LightKind> {
     }
 }
 
-/// Makes sure that the scene is lit. A file without any light gets that of [`super::load`], and so does any file on
-/// request, and, where no environment lights it, one whose emission lights less than a quarter of what its camera sees ([`lit_share`], which is `known` from
-/// an earlier pose, so that a film does not change its light). A file whose lights are all turned down to zero is refused: that is hardly what was meant.
+/// What was found out in an earlier pose, so that a film does not change its light.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Known {
+    /// Share of what the camera sees that the file's own emission lights.
+    lit: Option<Option<f64>>,
+    /// The studio before a camera; `None` in it where walls keep it out.
+    studio: Option<(Option<Choice>, Option<Arc<Environment>>)>,
+}
+
+/// Makes sure that the scene is lit. A file without any light gets that of [`super::load`], and so does, where no environment
+/// lights it, one whose emission lights less than a quarter of what its camera sees ([`lit_share`]); light from the viewer is
+/// added to any file on request. A file whose lights are all turned down to zero is refused: that is hardly what was meant.
 pub(super) fn ensure_light(
     document: &Document,
     scene: &mut Scene,
     used: &UsedMaterials,
     options: &LoadOptions,
-    known: &mut Option<Option<f64>>,
+    known: &mut Known,
     warnings: &mut Vec<Warning>,
 ) -> Result<()> {
     if let Some(around) = &scene.environment {
@@ -114,15 +125,15 @@ pub(super) fn ensure_light(
     }
     if lit {
         let punctual = scene.lights.iter().any(|light| light.intensity.max_element() > 0.0);
-        let share = match (punctual, *known) {
+        let share = match (punctual, known.lit) {
             (true, _) => None,
             (false, Some(share)) => share,
-            (false, None) => *known.insert(lit_share(scene)),
+            (false, None) => *known.lit.insert(lit_share(scene)),
         };
         if let Some(share) = share.filter(|share| *share < LEAST_LIT) {
-            viewer_light(scene, options.framed);
+            let added = default_light(scene, options, known)?;
             warnings.push(Warning(format!(
-                "what the file lets shine lights {:.0} % of what its camera sees, less than {:.0} %; {ADDED}",
+                "what the file lets shine lights {:.0} % of what its camera sees, less than {:.0} %; {added}",
                 100.0 * share,
                 100.0 * LEAST_LIT
             )));
@@ -139,12 +150,29 @@ pub(super) fn ensure_light(
              zero, or remove them all for a default light",
         ));
     }
-    viewer_light(scene, options.framed);
-    warnings.push(Warning(format!("the file has no light; {ADDED}")));
+    let added = default_light(scene, options, known)?;
+    warnings.push(Warning(format!("the file has no light; {added}")));
     Ok(())
 }
 
-/// Adds the light of a file without any.
+/// Adds the light of a file without any; tells which it is.
+fn default_light(scene: &mut Scene, options: &LoadOptions, known: &mut Known) -> Result<&'static str> {
+    let studio = match known.studio.take().filter(|(camera, _)| *camera == options.camera) {
+        Some((_, studio)) => studio,
+        None if is_open(scene) => Some(Arc::new(Environment::studio(&scene.cameras[0])?)),
+        None => None,
+    };
+    known.studio = Some((options.camera.clone(), studio.clone()));
+    let Some(studio) = studio else {
+        viewer_light(scene, options.framed);
+        return Ok(VIEWER);
+    };
+    scene.lights.extend(studio.suns().iter().cloned());
+    scene.environment = Some(studio);
+    Ok(STUDIO)
+}
+
+/// Adds light from the viewer.
 fn viewer_light(scene: &mut Scene, framed: Option<(DVec3, DVec3)>) {
     let camera = &scene.cameras[0];
     let eye = camera.eye();

@@ -61,7 +61,7 @@ pub use meshes::{MAX_COORDINATE, MAX_TRIANGLES};
 pub use resources::MAX_FILE_BYTES;
 pub use vertices::{Vertices, has_only_points, read_vertices};
 
-use super::environment::Panorama;
+use super::environment::{Panorama, Sky};
 use super::{Environment, Material, Scene, Texture, Warning};
 use crate::error::{Error, Result};
 use document::Document;
@@ -110,7 +110,9 @@ pub struct LoadOptions {
     pub clip: Clip,
     /// Time in the clip [s]; before its first or after its last key the pose of that key is held.
     pub time: f64,
-    /// Whether the default light of an unlit file is added to the lights of this one.
+    /// Whether light from the viewer is added to the lights of the file: a directional one of irradiance 2.2 W/m² from the
+    /// upper left, and a point light at the first camera that gives 0.8 W/m² at the middle of the scene and reaches all that
+    /// the camera sees, through the backs of one-sided walls too.
     pub viewer_light: bool,
     /// A file without a camera or a light is given one that suits this box (low, high) [m]. `None`: the box of the scene
     /// as it is posed. An animation that one camera is to see gives the box of all its poses.
@@ -119,6 +121,8 @@ pub struct LoadOptions {
     pub allow_outside: bool,
     /// What lights the scene from all around, in place of the light that a file without any gets.
     pub environment: Option<Panorama>,
+    /// Sun and sky instead of that.
+    pub sky: Option<Sky>,
 }
 
 /// A scene and what had to be assumed to make it.
@@ -133,12 +137,10 @@ pub struct Loaded {
 /// Loads the glTF file at `path`, or the scene that comes with the library by that name ([`embedded`]), flattened into
 /// world-space triangles.
 ///
-/// A file that lights nothing (no emission, no punctual light, not everything unlit) is lit by a directional light of
-/// irradiance 2.2 W/m² from the viewer's upper left and by a point light at the first camera that gives 0.8 W/m² at the
-/// middle of the scene, so that a white surface square to both has a radiance of about 1 W/(m² sr). The light at the camera
-/// reaches all that the camera sees, through the backs of one-sided walls too. The same light is added to the file's own
-/// where that is emission alone and lights less than a quarter of what the camera sees (a glowing label on a dark model),
-/// and on request: a lamp that shines away from the viewer is else a dark shape.
+/// A file that lights nothing (no emission, no punctual light, no environment, not everything unlit) stands in a soft studio
+/// ([`Environment::studio`]), which its chrome and glass show; where walls keep that light from most of what the camera sees,
+/// it gets the light of [`LoadOptions::viewer_light`] instead. So does one whose own light is emission alone and lights less
+/// than a quarter of what the camera sees (a glowing label on a dark model).
 ///
 /// # Errors
 ///
@@ -154,8 +156,8 @@ pub struct File {
     document: Document,
     warnings: Vec<Warning>,
     decoded: Option<Decoded>,
-    /// What share of the view the file's own emission lights, once it was looked at.
-    lit: Option<Option<f64>>,
+    /// What was found out of its light, once it was looked at.
+    light: lights::Known,
     /// The panorama that was read last.
     around: Option<(Panorama, Arc<Environment>)>,
     /// The file's own environment, once it was looked for, and the scene that names it.
@@ -188,7 +190,7 @@ impl File {
     pub fn open_with(path: &Path, options: &LoadOptions) -> Result<Self> {
         let mut warnings = Vec::new();
         let document = Document::open(path, options.allow_outside, &mut warnings)?;
-        Ok(Self { document, warnings, decoded: None, lit: None, around: None, own_around: None })
+        Ok(Self { document, warnings, decoded: None, light: lights::Known::default(), around: None, own_around: None })
     }
 
     /// A glTF or GLB file from its bytes, which hold all that it needs: buffers and images in the binary chunk or in data URIs.
@@ -201,7 +203,7 @@ impl File {
         let mut warnings = Vec::new();
         let source = resources::Source { scene: name, allow_outside: false, is_alone: true };
         let document = Document::of_bytes(source, bytes, true, &mut warnings)?;
-        Ok(Self { document, warnings, decoded: None, lit: None, around: None, own_around: None })
+        Ok(Self { document, warnings, decoded: None, light: lights::Known::default(), around: None, own_around: None })
     }
 
     /// The scene in the pose that `options` name.
@@ -246,7 +248,7 @@ impl File {
             }
         };
         let mut scene = Scene { triangles, materials, textures, lights, environment, cameras };
-        lights::ensure_light(document, &mut scene, &decoded.used, options, &mut self.lit, &mut warnings)?;
+        lights::ensure_light(document, &mut scene, &decoded.used, options, &mut self.light, &mut warnings)?;
         self.decoded = Some(decoded);
         Ok(Loaded { scene: Arc::new(scene), warnings })
     }
@@ -286,7 +288,9 @@ fn around(
     options: &LoadOptions,
     warnings: &mut Vec<Warning>,
 ) -> Result<Option<Arc<Environment>>> {
-    let Some(panorama) = &options.environment else { return Ok(None) };
+    let Some(panorama) = &options.environment else {
+        return options.sky.as_ref().map(|sky| Environment::sky(sky).map(Arc::new)).transpose();
+    };
     let around = match kept.take().filter(|(last, _)| last == panorama) {
         Some((_, around)) => around,
         None => Arc::new(Environment::read(panorama)?),

@@ -2,6 +2,7 @@
 //!
 //! A coarse picture by path tracing: rays of the first camera, the direct light of points drawn on the emitting triangles,
 //! and a few diffuse bounces. A pixel is lit where its radiance is at least [`DARK`] or a [`FAINT`]th of the brightest one's.
+//! Also whether light from all around would light it, or walls keep it out.
 
 use crate::random::Random;
 use crate::scene::bvh::{Hit, Ray, SceneBvh, Sides};
@@ -32,31 +33,59 @@ struct Emitters {
 /// too little is seen to tell.
 pub(super) fn lit_share(scene: &mut Scene) -> Option<f64> {
     let emitters = Emitters::new(scene)?;
-    let camera = scene.cameras.first()?.clone();
-    let shared = Arc::new(std::mem::take(scene));
-    let bvh = SceneBvh::new(Arc::clone(&shared));
-    let aspect = camera.aspect().unwrap_or(1.0);
-    let seen: Vec<f64> = (0..SIDE * SIDE)
-        .filter_map(|i| {
-            let place = |k: u64| (k as f64 + 0.5) / SIDE as f64;
-            let ray = camera.ray(place(i % SIDE), place(i / SIDE), aspect);
-            let hit = bvh.nearest(&ray, 0.0, Sides::Front)?;
-            let material = shared.material(hit.triangle);
-            // What mirrors or lets light through shows what stands elsewhere.
-            let clear = material.transmission > 0.0 || (material.metallic > 0.5 && material.roughness < 0.3);
-            let mut random = Random::new(0x11ed, i);
-            (!clear)
-                .then(|| if material.unlit { f64::INFINITY } else { emitters.radiance(&bvh, &ray, hit, &mut random) })
-        })
-        .collect();
-    drop(bvh);
-    *scene = Arc::try_unwrap(shared).unwrap_or_else(|shared| (*shared).clone());
-    if seen.len() < 8 {
+    let seen = seen(scene, |bvh, ray, hit, random| {
+        let material = bvh.scene().material(hit.triangle);
+        // What mirrors or lets light through shows what stands elsewhere.
+        let clear = material.transmission > 0.0 || (material.metallic > 0.5 && material.roughness < 0.3);
+        (!clear).then(|| if material.unlit { f64::INFINITY } else { emitters.radiance(bvh, ray, hit, random) })
+    });
+    if seen.len() < FEWEST {
         return None;
     }
     let brightest = seen.iter().copied().filter(|light| light.is_finite()).fold(0.0, f64::max);
     let lit = seen.iter().filter(|light| **light >= DARK || **light > brightest / FAINT).count();
     Some(lit as f64 / seen.len() as f64)
+}
+
+/// Rays with which a place looks out of the scene, and the part of what the camera sees from where some of them must leave it.
+const LOOKS: u32 = 12;
+const OPEN: f64 = 0.6;
+
+/// Whether light from all around reaches most of the surfaces that the first camera sees.
+pub(super) fn is_open(scene: &mut Scene) -> bool {
+    let seen = seen(scene, |bvh, ray, hit, random| {
+        let plain = bvh.scene().triangles[hit.triangle as usize].normal();
+        let normal = if plain.dot(ray.direction) > 0.0 { -plain } else { plain };
+        let origin = hit.position + normal * bvh.offset();
+        let leaves = |random: &mut Random| {
+            let direction = scattered(normal, random);
+            bvh.nearest(&Ray { origin, direction }, 0.0, Sides::Both).is_none()
+        };
+        Some((0..LOOKS).any(|_| leaves(random)))
+    });
+    let open = seen.iter().filter(|open| **open).count();
+    seen.len() < FEWEST || open as f64 >= OPEN * seen.len() as f64
+}
+
+/// Fewer places that are seen do not tell.
+const FEWEST: usize = 8;
+
+/// What `of` finds at the surfaces that rays of the first camera meet.
+fn seen<T>(scene: &mut Scene, of: impl Fn(&SceneBvh, &Ray, Hit, &mut Random) -> Option<T>) -> Vec<T> {
+    let Some(camera) = scene.cameras.first().cloned() else { return Vec::new() };
+    let shared = Arc::new(std::mem::take(scene));
+    let bvh = SceneBvh::new(Arc::clone(&shared));
+    let aspect = camera.aspect().unwrap_or(1.0);
+    let look = |i: u64| {
+        let place = |k: u64| (k as f64 + 0.5) / SIDE as f64;
+        let ray = camera.ray(place(i % SIDE), place(i / SIDE), aspect);
+        let hit = bvh.nearest(&ray, 0.0, Sides::Front)?;
+        of(&bvh, &ray, hit, &mut Random::new(0x11ed, i))
+    };
+    let found = (0..SIDE * SIDE).filter_map(look).collect();
+    drop(bvh);
+    *scene = Arc::try_unwrap(shared).unwrap_or_else(|shared| (*shared).clone());
+    found
 }
 
 impl Emitters {
