@@ -360,6 +360,7 @@ fn help_is_short_or_has_examples_and_what_was_meant_is_told() {
         "show",
         "print",
         "print preview",
+        "print sheet",
         "print export",
         "print verify",
         "calibrate",
@@ -591,5 +592,5 @@ fn every_command_of_the_guide_to_the_lab_runs() {
 
 #[test]
 fn every_command_of_the_guide_to_plates_runs() {
-    every_command_runs("src/guide/plates.md", 8, &["seen.png", "rainbow.png"]);
+    every_command_runs("src/guide/plates.md", 9, &["seen.png", "seen-traced.png", "sheet.html", "rainbow.png"]);
 }

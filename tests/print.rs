@@ -499,7 +499,8 @@ fn five_eyes_see_in_the_fringes_what_rays_show_each_of_them() {
     let (mut seen, mut traced) = (Vec::new(), Vec::new());
     for (i, eye) in eyes.into_iter().enumerate() {
         let (at, name) = (format!("{eye},40mm"), format!("eye{i}.png"));
-        let preview = ["print", "preview", "plate", "--eye", &at, "--focus", "-6mm", "--traced", &scene, "-o", &name];
+        let preview =
+            ["print", "preview", "plate", "--eye", &at, "--focus", "-6mm", "--traced", &scene, "--bare", "-o", &name];
         let report = done(f, &preview);
         assert_eq!(report["focus"], -6e-3);
         seen.push(picture(&f.join(&name)));

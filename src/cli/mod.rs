@@ -26,6 +26,8 @@ mod monitors;
 mod output;
 mod panels;
 mod pictures;
+mod plate_source;
+mod plate_views;
 mod plates;
 mod print;
 mod reconstruct;

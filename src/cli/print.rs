@@ -1,20 +1,20 @@
 //! Plates: planned, computed, checked, looked at, exported.
 
-use super::args::{ExportArgs, FileArgs, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs, White};
+use super::args::{ExportArgs, FileArgs, PrintArgs, PrintCommand, VerifyArgs, White};
 use super::bar::Bar;
 use super::report::{Report, count, seconds};
+use super::{plate_source, plate_views};
 use crate::print::export::{Frames, export};
-use crate::print::preview::PreviewSettings;
-use crate::print::{Asked, Lamp, Manifest, Plan, Plate, PlateJob, PlateView, PrintSettings, Shard, folder};
+use crate::print::{Asked, Plan, Plate, PlateJob, PrintSettings, Shard, folder};
 use crate::segments::SceneOptions;
 use crate::units::show_length;
 use crate::{Error, Result};
-use std::path::{Path, PathBuf};
 
 pub(super) fn print(args: &PrintArgs, json: bool) -> Result<Report> {
     match &args.command {
         Some(PrintCommand::Verify(args)) => verify(args),
-        Some(PrintCommand::Preview(args)) => preview(args),
+        Some(PrintCommand::Preview(args)) => plate_views::preview(args),
+        Some(PrintCommand::Sheet(args)) => plate_views::sheet(args),
         Some(PrintCommand::Export(args)) => write(args),
         None => compute(resolved(args)?, json),
     }
@@ -42,11 +42,11 @@ fn resolved(args: &PrintArgs) -> Result<PrintSettings> {
         folder => folder.clone().unwrap_or_default(),
     };
     let light = &args.light;
+    let asked = Asked { size: args.size, pitch: args.pitch, binarisation: args.binarisation, phase: args.phase };
+    let plate = Plate::find(path, &asked)?;
+    let input = plate_source::source(args, &input, &plate)?;
     Ok(PrintSettings {
-        plate: Plate::find(
-            path,
-            &Asked { size: args.size, pitch: args.pitch, binarisation: args.binarisation, phase: args.phase },
-        )?,
+        plate,
         input,
         options: scene_options(&light.file, light.bounces, light.photons, light.white)?,
         folder,
@@ -133,10 +133,6 @@ fn bytes(bytes: u64) -> String {
     }
 }
 
-fn lengths(wavelengths: &[f64]) -> String {
-    wavelengths.iter().map(|w| show_length(*w)).collect::<Vec<_>>().join(", ")
-}
-
 fn report_plan(plan: &Plan, plate: &Plate) -> Report {
     let mut report = Report::new("plan");
     report.section(plan);
@@ -171,7 +167,7 @@ fn report_plan(plan: &Plan, plate: &Plate) -> Report {
             show_length(slit.height),
             show_length(plate.view.viewer),
             slit.strip,
-            lengths(&slit.wavelengths)
+            plate_views::lengths(&slit.wavelengths)
         ));
     }
     report.line(format!(
@@ -203,59 +199,6 @@ fn verify(args: &VerifyArgs) -> Result<Report> {
         seconds(found.seconds)
     );
     report.add("tiles", found.tiles, line);
-    Ok(report)
-}
-
-/// `name.png` → `name-traced.png`.
-fn beside(path: &Path) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!("{stem}-traced.png"))
-}
-
-fn preview(args: &PreviewArgs) -> Result<Report> {
-    let mut report = Report::new("print preview");
-    let settings = PreviewSettings {
-        eye: args.eye,
-        pupil: args.pupil,
-        focus: args.focus,
-        size: args.size,
-        part: args.part,
-        wavelength: args.wavelength,
-        lamp: (args.lamp.is_some() || args.bandwidth.is_some()).then(|| {
-            let [diameter, distance] = args.lamp.unwrap_or([0.0, 1.0]);
-            Lamp { diameter, distance, bandwidth: args.bandwidth.unwrap_or(0.0), places: args.places }
-        }),
-        memory: args.memory,
-    };
-    let place = Manifest::of(&args.folder)?.settings.plate.view.place;
-    report.check_side("focus", args.focus, Some([place; 2]));
-    let bar = Bar::new();
-    let mut view = PlateView::new(&args.folder, &settings, &bar.progress)?;
-    view.write_png(&args.output, args.white)?;
-    let seen = &view.report;
-    if seen.dazzled {
-        report.warn(["the lamp's own light goes through the plate into this pupil; move the eye out of it"]);
-    }
-    report.line(format!(
-        "simulated view in focus at z = {}, {:.2} × {:.2} mm, in the light of {}, one column of {} and one row of {} \
-         of light kept, in {}",
-        show_length(seen.focus),
-        seen.half[0] * 2e3,
-        seen.half[1] * 2e3,
-        lengths(&seen.wavelengths),
-        seen.thinned[0],
-        seen.thinned[1],
-        seconds(seen.seconds)
-    ));
-    if let Some(scene) = &args.traced {
-        let path = beside(&args.output);
-        let [alike, smooth] = view.compare(scene, &path, &bar.progress)?;
-        let line =
-            format!("traced       {}: SSIM {:.3}, over 4 × 4 cells {:.3}", path.display(), alike.ssim, smooth.ssim);
-        report.add("traced", path.display().to_string(), line);
-    }
-    report.section(&view.report);
-    report.output("picture", &args.output);
     Ok(report)
 }
 

@@ -9,6 +9,7 @@ use crate::field::arrays::{self, Values};
 use crate::files::pictures;
 use crate::names::{Name, Named};
 use crate::units::show_length;
+use serde::{Deserialize, Serialize};
 use std::io::Read;
 use std::path::Path;
 
@@ -20,7 +21,8 @@ const MOST: u64 = 1 << 28;
 const NOTHING: f64 = 1e9;
 
 /// Which end of the depth map's gray scale is near.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum DepthScale {
     /// White is near, black is far (OpenHolo, tensor holography).
     #[default]
@@ -36,7 +38,7 @@ impl Named for DepthScale {
 }
 
 /// How a depth map is read.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DepthReading {
     /// Which end of the scale is near; of numbers whether the greater is nearer. By default white, and the smaller distance.
     pub scale: Option<DepthScale>,

@@ -34,6 +34,7 @@ mod eye_tests;
 mod from_scene;
 mod gather;
 pub mod images;
+pub mod lattice;
 #[cfg(test)]
 mod odd_tests;
 mod placed;

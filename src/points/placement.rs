@@ -82,7 +82,7 @@ impl Phase {
 
 /// −k·distance, reduced to 0 … 2π [rad], for a vacuum wavelength [m]: the phase with which a wave from that distance [m]
 /// arrives in step.
-pub(super) fn path_phase(distance: f64, wavelength: f64) -> f64 {
+pub(crate) fn path_phase(distance: f64, wavelength: f64) -> f64 {
     let turns = -distance / wavelength;
     std::f64::consts::TAU * (turns - turns.floor())
 }

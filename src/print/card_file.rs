@@ -59,7 +59,7 @@ pub fn write_card(plate: &Plate, patch: Option<f64>, folder: &Path, progress: &P
     let file = FileLayout { guard: 0, marks: 0, tile: 1024.min(width.min(height) / 64 * 64), ..plate.file };
     let raster = Raster { width, height, ..plate.raster };
     let segment = file.tile;
-    let plate = Plate { name, raster, file, segment, slit: None, transfer: None, ..plate.clone() };
+    let plate = Plate { name, raster, file, segment, slit: None, transfer: None, fade: 0, ..plate.clone() };
     plate.check().map_err(|what| Error::parameter("patch", what))?;
     let program = concat!("holodrive ", env!("CARGO_PKG_VERSION")).to_owned();
     let options = BTreeMap::from([("card".to_owned(), serde_json::json!({ "patch": side }))]);

@@ -17,9 +17,9 @@ use crate::encode::fringe::Fringe;
 use crate::error::Result;
 use crate::field::{Complex32, Complex64};
 use crate::progress::Progress;
-use crate::segments::{ObjectWave, Rect, Work};
+use crate::segments::{ObjectWave, Piece, Rect, Work};
 use rayon::prelude::*;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::time::Instant;
 
 /// Pixels beside and above a tile in which error diffusion settles: its errors are forgotten after some ten pixels.
@@ -37,6 +37,36 @@ pub struct PlateFringes {
 }
 
 impl PlateFringes {
+    /// The object's field u on a rectangle. Of wavelengths that are superimposed it is Σ u_c·conj(r_c)·r, with r_c their
+    /// references and r the plate's own: with r it makes the sum of their fringes.
+    ///
+    /// # Errors
+    /// As [`ObjectWave::field`].
+    pub(super) fn field(&self, rect: &Rect, pieces: &[Piece], progress: &Progress) -> Result<(Vec<Complex32>, Work)> {
+        let (plate, grid) = (&self.plate, &self.wave.plane.grid);
+        let Some(slit) = plate.slit.as_ref().filter(|slit| slit.superimposed) else {
+            return self.wave.field(rect, pieces, progress);
+        };
+        let (mut sum, mut work) = (vec![Complex32::default(); rect.area()], Work::default());
+        for (index, &wavelength) in slit.wavelengths.iter().enumerate() {
+            let (field, took) = self.wave.field_of(index, rect, pieces, progress)?;
+            work += took;
+            sum.par_chunks_mut(rect.width()).zip(field.par_chunks(rect.width())).enumerate().for_each_init(
+                || (Vec::new(), Vec::new()),
+                |(own, reference), (i, (sum, field))| {
+                    let (row, columns) = (rect.y[0] + i as i64, rect.x[0]..rect.x[1]);
+                    plate.reference.row(grid, wavelength, row, columns.clone(), own);
+                    plate.reference.row(grid, plate.wavelength, row, columns, reference);
+                    for (((sum, u), own), r) in sum.iter_mut().zip(field).zip(own.iter()).zip(reference.iter()) {
+                        *sum += u * own.conj() * r;
+                    }
+                },
+            );
+        }
+        work.pixels = rect.area() as u64;
+        Ok((sum, work))
+    }
+
     /// The fringe's transmittance on a rectangle, 0 to 1, for a field whose full swing is `amplitude`.
     pub(super) fn fringe(&self, field: &[Complex32], rect: &Rect, amplitude: f32) -> Vec<f32> {
         let (plate, grid) = (&self.plate, &self.wave.plane.grid);
@@ -50,6 +80,12 @@ impl PlateFringes {
             None => (None, None),
             Some(transfer) => (transfer.lines(&plate.fringe), transfer.tone(&plate.fringe)),
         };
+        let (area, fade) = (fringe_area(plate), plate.fade as f64);
+        // 0 at the edge, 1 where nothing fades.
+        let faded = |at: i64, [from, end]: [i64; 2]| {
+            let inside = (at - from).min(end - 1 - at) as f64 + 0.5;
+            if inside < fade { (0.5 - 0.5 * (PI * inside / fade).cos()) as f32 } else { 1.0 }
+        };
         // Lines of the highest level are what is open, or what is closed.
         let inwards = if polarity == Polarity::Negative { -1.0 } else { 1.0 };
         let mut out = vec![0.0; rect.area()];
@@ -59,6 +95,7 @@ impl PlateFringes {
                 let row = rect.y[0] + i as i64;
                 let wavelength = plate.wavelength_of(row);
                 plate.reference.row(grid, wavelength, row, rect.x[0]..rect.x[1], reference);
+                let shown = faded(row, area.y);
                 for (((t, &u), &r), column) in out.iter_mut().zip(field).zip(reference.iter()).zip(rect.x[0]..) {
                     let value = match lines {
                         Some(bias) => {
@@ -70,6 +107,7 @@ impl PlateFringes {
                         None if searched => fringe.value(u, r),
                         None => fringe.value(u, r).clamp(0.0, 1.0),
                     };
+                    let value = value * shown * faded(column, area.x);
                     let value = if polarity == Polarity::Negative { 1.0 - value } else { value };
                     *t = tone.as_ref().map_or(value, |tone| tone.level(value));
                 }
@@ -135,7 +173,7 @@ impl PlateFringes {
                 grown = core.grown(HALO, &area);
             }
             let pieces = self.wave.plane.pieces(&core, &grown);
-            let (field, took) = self.wave.field(&grown, &pieces, progress)?;
+            let (field, took) = self.field(&grown, &pieces, progress)?;
             work = took;
             let begin = Instant::now();
             wishes = self.levels(&field, &grown, amplitude);

@@ -3,9 +3,10 @@
 use super::folder::{self, TileReport};
 use super::fringe::PlateFringes;
 use super::manifest::{Manifest, Settings};
-use super::plan::{Plan, plan};
+use super::plan::{NOT_A_SCENE, Plan, plan};
 use super::plate::Plate;
 use super::shard::Shard;
+use super::source::Source;
 use crate::error::{Error, Result};
 use crate::hologram::InstructionSet;
 use crate::progress::Progress;
@@ -19,8 +20,8 @@ use std::path::{Path, PathBuf};
 pub struct PrintSettings {
     /// The plate.
     pub plate: Plate,
-    /// A scene (glTF, OBJ, STL), or points (a cloud).
-    pub input: PathBuf,
+    /// What it shows.
+    pub input: Source,
     /// How a scene is lit.
     pub options: SceneOptions,
     /// The plate's folder.
@@ -63,9 +64,12 @@ impl PlateJob {
     /// with kernels that this machine does not have; as [`Plate::segments`] and [`Object::read`].
     pub fn new(asked: PrintSettings, progress: &Progress) -> Result<Self> {
         let PrintSettings { plate, input, mut options, folder, shard, dry_run } = asked;
-        if !is_cloud(&input) && !is_scene(&input) {
+        if let Source::File(input) = &input
+            && !is_cloud(input)
+            && !is_scene(input)
+        {
             let what = "is no scene (.gltf, .glb, .obj, .stl) or point cloud (.ply, .xyz, .pcd, .las)";
-            let what = not_embedded(&input).unwrap_or_else(|| what.into());
+            let what = not_embedded(input).unwrap_or_else(|| what.into());
             return Err(Error::input(input, what));
         }
         let settings = Settings::new(&plate, &input, &options)?;
@@ -78,7 +82,10 @@ impl PlateJob {
         }
         // Before the light, which may take long.
         let plane = plate.segments()?;
-        let object = Object::read(&input, &options, &plane, progress)?;
+        let object = match &input {
+            Source::File(input) => Object::read(input, &options, &plane, progress)?,
+            Source::Pictures(pictures) => pictures.object(&plate, &plane)?,
+        };
         let fringes = PlateFringes { plate, wave: ObjectWave { plane, object, instruction_set } };
         Ok(Self { fringes, settings, folder, shard, manifest, amplitude: None })
     }
@@ -91,8 +98,12 @@ impl PlateJob {
         if self.manifest.is_some() {
             return Ok(None);
         }
-        let plan = plan(&self.fringes, &self.folder, progress)?;
+        let mut plan = plan(&self.fringes, &self.folder, progress)?;
         self.amplitude = Some(plan.amplitude);
+        if self.settings.pictures().is_some() {
+            // Flat pictures are meant to be the same from everywhere.
+            plan.warnings.retain(|warning| warning != NOT_A_SCENE);
+        }
         Ok(Some(plan))
     }
 

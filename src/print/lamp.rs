@@ -4,12 +4,15 @@
 //! each other by the lamp's angle times the depth from the plate, and add up as intensities. That blurs what is far from
 //! the plate and averages speckle out: with none of it a plate of matte surfaces is seen in full speckle.
 
+use crate::config::ConfigFile;
 use crate::error::{Error, Result};
-use serde::Serialize;
+use crate::units::{self, show_length};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
+use std::fmt;
 
 /// A round lamp with a spectrum.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lamp {
     /// Diameter [m]; 0 for a point.
     pub diameter: f64,
@@ -17,8 +20,39 @@ pub struct Lamp {
     pub distance: f64,
     /// Full width at half maximum of its spectrum, a Gaussian, about each of the plate's wavelengths [m]; 0 for a laser.
     pub bandwidth: f64,
-    /// Places of the lamp that are looked at in all, shared among wavelengths.
-    pub places: usize,
+}
+
+impl fmt::Display for Lamp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { diameter, distance, bandwidth } = *self;
+        match diameter > 0.0 {
+            true => write!(f, "lamp of {} at {}", show_length(diameter), show_length(distance))?,
+            false => f.write_str("point")?,
+        }
+        if bandwidth > 0.0 { write!(f, ", {} wide in wavelength", show_length(bandwidth)) } else { Ok(()) }
+    }
+}
+
+/// A plate's lamp in TOML.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LampFile {
+    diameter: String,
+    distance: String,
+    bandwidth: Option<String>,
+}
+
+impl LampFile {
+    pub(super) fn read(&self, at: ConfigFile) -> Result<Lamp> {
+        Ok(Lamp {
+            diameter: at.read("lamp.diameter", &self.diameter, units::length)?,
+            distance: at.read("lamp.distance", &self.distance, units::positive_length)?,
+            bandwidth: self
+                .bandwidth
+                .as_ref()
+                .map_or(Ok(0.0), |text| at.read("lamp.bandwidth", text, units::length))?,
+        })
+    }
 }
 
 /// Light of one wavelength of a lamp.
@@ -36,22 +70,26 @@ pub(super) struct LampLight {
 const MOST_PLACES: usize = 4096;
 
 impl Lamp {
-    /// Light of so many wavelengths about `wavelength` [m].
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] for a lamp wider than far, a spectrum wider than its wavelength allows, and no or too many places.
-    pub(super) fn light(&self, wavelength: f64) -> Result<Vec<LampLight>> {
-        let &Self { diameter, distance, bandwidth, places } = self;
+    /// What is wrong with it for light of `wavelength` [m], by the name of what is wrong.
+    pub(super) fn check(&self, wavelength: f64) -> Result<(), (&'static str, String)> {
+        let &Self { diameter, distance, bandwidth } = self;
         if !(diameter >= 0.0 && distance > 0.0 && distance.is_finite() && diameter <= distance) {
-            return Err(Error::parameter(
-                "lamp",
-                format!("{diameter} m wide at {distance} m must be farther than wide"),
-            ));
+            return Err(("lamp", format!("{diameter} m wide at {distance} m must be farther than wide")));
         }
         if !(0.0..0.25 * wavelength).contains(&bandwidth) {
             let what = format!("{bandwidth} m must be less than a quarter of the wavelength {wavelength} m");
-            return Err(Error::parameter("bandwidth", what));
+            return Err(("bandwidth", what));
         }
+        Ok(())
+    }
+
+    /// Light of so many wavelengths about `wavelength` [m], from `places` places in all.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a lamp wider than far, a spectrum wider than its wavelength allows, and no or too many places.
+    pub(super) fn light(&self, wavelength: f64, places: usize) -> Result<Vec<LampLight>> {
+        self.check(wavelength).map_err(|(name, what)| Error::parameter(name, what))?;
+        let &Self { diameter, distance, bandwidth } = self;
         if !(1..=MOST_PLACES).contains(&places) {
             return Err(Error::parameter("lamp", format!("{places} places must be 1 to {MOST_PLACES}")));
         }
@@ -85,8 +123,8 @@ mod tests {
 
     #[test]
     fn a_lamp_is_as_wide_and_as_coloured_as_asked() {
-        let lamp = Lamp { diameter: 3e-3, distance: 0.3, bandwidth: 20e-9, places: 64 };
-        let light = lamp.light(633e-9).expect("light");
+        let lamp = Lamp { diameter: 3e-3, distance: 0.3, bandwidth: 20e-9 };
+        let light = lamp.light(633e-9, 64).expect("light");
         assert_eq!((light.len(), light.iter().map(|l| l.tilts.len()).sum::<usize>()), (8, 64));
         assert!((light.iter().map(|l| l.share).sum::<f64>() - 1.0).abs() < 1e-12);
         let mean = |f: &dyn Fn(f64) -> f64| light.iter().map(|l| l.share * f(l.wavelength)).sum::<f64>();
@@ -101,15 +139,13 @@ mod tests {
             assert!((square.sqrt() / 5e-3 - 0.5).abs() < 0.03, "{square}");
             assert!(tilts.sum::<f64>().abs() / 64.0 < 0.2e-3);
         }
-        let laser = Lamp { diameter: 0.0, bandwidth: 0.0, ..lamp }.light(633e-9).expect("laser");
+        let laser = Lamp { diameter: 0.0, bandwidth: 0.0, ..lamp }.light(633e-9, 64).expect("laser");
         assert_eq!(laser, [LampLight { wavelength: 633e-9, share: 1.0, tilts: vec![[0.0; 2]] }]);
-        for wrong in [
-            Lamp { diameter: 1.0, ..lamp },
-            Lamp { diameter: f64::NAN, ..lamp },
-            Lamp { bandwidth: 0.2e-6, ..lamp },
-            Lamp { places: 0, ..lamp },
-        ] {
-            assert!(wrong.light(633e-9).is_err(), "{wrong:?}");
+        for wrong in
+            [Lamp { diameter: 1.0, ..lamp }, Lamp { diameter: f64::NAN, ..lamp }, Lamp { bandwidth: 0.2e-6, ..lamp }]
+        {
+            assert!(wrong.light(633e-9, 64).is_err(), "{wrong:?}");
         }
+        assert!(lamp.light(633e-9, 0).is_err());
     }
 }

@@ -1,6 +1,7 @@
 //! What a folder holds: the settings of its plate, the hashes of its inputs, and in the end those of its tiles.
 
 use super::plate::Plate;
+use super::source::{PictureDepths, PictureFiles, Source};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::scene::gltf;
@@ -16,6 +17,12 @@ use std::time::SystemTime;
 
 /// Name of the manifest in its folder.
 pub(super) const NAME: &str = "manifest.json";
+
+/// What is said of another input than the plate's own.
+pub(super) const NOT_THE_INPUT: &str = "is not the file that the plate was made of, or has changed since";
+
+/// Key of the options that says where pictures stand.
+const PICTURES: &str = "pictures";
 
 /// A manifest is not larger than this [bytes]: the hashes of a million tiles.
 const LARGEST: u64 = 96 << 20;
@@ -58,12 +65,22 @@ pub struct Manifest {
 }
 
 impl Settings {
-    /// What decides a plate of a scene or of points.
+    /// What decides a plate of a scene, of points or of pictures.
     ///
     /// # Errors
     /// [`Error::Io`] for files that cannot be read.
-    pub fn new(plate: &Plate, input: &Path, options: &SceneOptions) -> Result<Self> {
+    pub fn new(plate: &Plate, source: &Source, options: &SceneOptions) -> Result<Self> {
         let program = concat!("holodrive ", env!("CARGO_PKG_VERSION")).to_owned();
+        let input = match source {
+            Source::File(input) => input,
+            Source::Pictures(pictures) => {
+                let depths = serde_json::to_value(&pictures.depths).unwrap_or_default();
+                let options = BTreeMap::from([(PICTURES.to_owned(), depths)]);
+                let file = |path: &PathBuf| Ok(Input { name: name(path), sha256: file_sha256(path)? });
+                let inputs = pictures.files.iter().map(file).collect::<Result<_>>()?;
+                return Ok(Self { program, plate: plate.clone(), inputs, options });
+            }
+        };
         // Points are neither seen by a camera nor lit.
         let around = options.environment.as_ref().map(|panorama| panorama.path.clone()).filter(|_| !is_cloud(input));
         let options = if is_cloud(input) { Value::Null } else { serde_json::to_value(options).unwrap_or_default() };
@@ -76,7 +93,17 @@ impl Settings {
         })
     }
 
-    /// How the scene of a plate was lit.
+    /// Where the pictures stand that a plate was made of; none of a scene or of points.
+    pub(super) fn pictures(&self) -> Option<PictureDepths> {
+        self.options.get(PICTURES).and_then(|depths| serde_json::from_value(depths.clone()).ok())
+    }
+
+    /// How the scene of a plate was lit; the usual way where nothing was.
+    pub(super) fn options(&self) -> SceneOptions {
+        serde_json::from_value(Value::Object(self.options.clone().into_iter().collect())).unwrap_or_default()
+    }
+
+    /// How the scene of a plate was lit, by its file.
     ///
     /// # Errors
     /// [`Error::Input`] when the file is not the one that the plate was made of.
@@ -86,9 +113,26 @@ impl Settings {
             .map_err(|e| Error::input(input, format!("was lit in an unknown way: {e}")))?;
         let around = options.environment.as_ref().map(|panorama| panorama.path.as_path());
         if inputs(input, around)? != self.inputs {
-            return Err(Error::input(input, "is not the file that the plate was made of, or has changed since"));
+            return Err(Error::input(input, NOT_THE_INPUT));
         }
         Ok(options)
+    }
+
+    /// Refuses other pictures than those that the plate was made of.
+    ///
+    /// # Errors
+    /// [`Error::Input`]; [`Error::Io`].
+    pub(super) fn check_pictures(&self, pictures: &PictureFiles) -> Result<()> {
+        if pictures.files.len() != self.inputs.len() {
+            let what = format!("{} pictures, and the plate was made of {}", pictures.files.len(), self.inputs.len());
+            return Err(Error::parameter("traced", what));
+        }
+        for (path, input) in pictures.files.iter().zip(&self.inputs) {
+            if file_sha256(path)? != input.sha256 {
+                return Err(Error::input(path, NOT_THE_INPUT));
+            }
+        }
+        Ok(())
     }
 
     /// The first setting in which two differ, with both values; numbers are compared as they are written.
@@ -210,26 +254,40 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().to_string()
+}
+
+/// SHA-256 of a file, hexadecimal.
+///
+/// # Errors
+/// [`Error::Io`].
+pub(super) fn file_sha256(path: &Path) -> Result<String> {
+    let mut file = File::open(path).map_err(Error::io(path))?;
+    let mut digest = Sha256::new();
+    let mut buffer = vec![0u8; 1 << 20];
+    loop {
+        match file.read(&mut buffer).map_err(Error::io(path))? {
+            0 => return Ok(hex(&digest.finalize())),
+            n => digest.update(&buffer[..n]),
+        }
+    }
+}
+
+/// Whether two plates are the same but for the last bits that a reader of decimals may lose.
+pub(super) fn same_plate(a: &Plate, b: &Plate) -> bool {
+    let tree = |plate: &Plate| serde_json::to_value(plate).unwrap_or(Value::Null);
+    differing("", &tree(a), &tree(b)).is_none()
+}
+
 /// Hashes of a scene or cloud and, for a glTF, of the files that it names; and of the panorama around it.
 ///
 /// # Errors
 /// [`Error::Io`] for files that cannot be read.
 fn inputs(path: &Path, around: Option<&Path>) -> Result<Vec<Input>> {
-    let hash = |path: &Path| -> Result<String> {
-        let mut file = File::open(path).map_err(Error::io(path))?;
-        let mut digest = Sha256::new();
-        let mut buffer = vec![0u8; 1 << 20];
-        loop {
-            match file.read(&mut buffer).map_err(Error::io(path))? {
-                0 => return Ok(hex(&digest.finalize())),
-                n => digest.update(&buffer[..n]),
-            }
-        }
-    };
-    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().to_string();
     // What is beside an embedded scene changes with the program only, as the scene does.
     let own = gltf::embedded(path).map(sha256);
-    let mut found = vec![Input { name: name(path), sha256: own.map_or_else(|| hash(path), Ok)? }];
+    let mut found = vec![Input { name: name(path), sha256: own.map_or_else(|| file_sha256(path), Ok)? }];
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
         let text = fs::read(path).map_err(Error::io(path))?;
         // What is no JSON is refused, with better words, by whoever reads the scene.
@@ -239,17 +297,17 @@ fn inputs(path: &Path, around: Option<&Path>) -> Result<Vec<Input>> {
         for uri in lists.iter().flatten().filter_map(|entry| entry.get("uri")?.as_str()) {
             let beside: PathBuf = path.parent().unwrap_or(Path::new("")).join(uri);
             if !uri.starts_with("data:") && beside.is_file() {
-                found.push(Input { name: uri.to_owned(), sha256: hash(&beside)? });
+                found.push(Input { name: uri.to_owned(), sha256: file_sha256(&beside)? });
             }
         }
     }
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) && !is_cloud(path) {
         for beside in gltf::File::open(path)?.files().iter().skip(1).filter(|beside| beside.is_file()) {
-            found.push(Input { name: name(beside), sha256: hash(beside)? });
+            found.push(Input { name: name(beside), sha256: file_sha256(beside)? });
         }
     }
     if let Some(around) = around {
-        found.push(Input { name: name(around), sha256: hash(around)? });
+        found.push(Input { name: name(around), sha256: file_sha256(around)? });
     }
     Ok(found)
 }

@@ -3,7 +3,7 @@
 //! A [`Plate`] (TOML) says what is printed. Its [`PlateFringes`] make a tile: the wave of the object on it
 //! ([`crate::segments`]), interference with the reference wave, levels. A [`PlateJob`] says what the plate takes ([`Plan`])
 //! and computes it; [`folder`] writes tiles into the plate's file, resumes, shares, checks. A [`PlateView`] is what an eye
-//! sees of the finished file in the light of its lamps ([`preview`]). [`export`] writes it in other formats. A card
+//! sees of the finished file in the light of its lamps ([`preview`]); [`write_sheet`] makes a job sheet of it. [`export`] writes it in other formats. A card
 //! ([`write_card`]) and its scan tell what a printer makes of levels and lines ([`calibrate`]), and a [`Transfer`] undoes it.
 //!
 //! The plate lies in the plane z = 0 of the hologram frame, centred, as the viewer sees it. Memory is that of a tile,
@@ -13,8 +13,11 @@ mod band;
 pub mod calibrate;
 mod card;
 mod card_file;
+mod command;
+mod diagram;
 mod dxf;
 pub mod export;
+mod flat_target;
 pub mod folder;
 mod format;
 mod fringe;
@@ -22,6 +25,7 @@ mod fringe_settings;
 mod gds;
 mod geometry;
 mod job;
+mod labelled;
 mod lamp;
 mod manifest;
 mod mask;
@@ -43,6 +47,8 @@ mod registration;
 #[cfg(test)]
 mod search_tests;
 mod shard;
+mod sheet;
+mod source;
 #[cfg(test)]
 mod tests;
 mod thinning;
@@ -55,6 +61,7 @@ pub use calibrate::PlateCalibration;
 pub use card_file::{WrittenCard, write_card};
 pub use fringe::PlateFringes;
 pub use job::{PlateJob, PrintReport, PrintSettings};
+pub use labelled::{write_pair, write_walk};
 pub use lamp::Lamp;
 pub use manifest::{Input, Manifest, Settings};
 pub use plan::{Plan, plan};
@@ -64,5 +71,7 @@ pub use printer::Printer;
 pub use reader::{Exported, Reader};
 pub use reference::{Reference, Side};
 pub use shard::Shard;
+pub use sheet::write_sheet;
+pub use source::{PictureDepths, PictureFiles, Source};
 pub use transfer::Transfer;
 pub use view::{PlateView, ViewReport};

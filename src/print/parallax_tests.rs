@@ -48,6 +48,7 @@ fn through_a_slit_points_stand_at_their_depth_from_left_to_right_and_each_colour
                 part: None,
                 wavelength,
                 lamp: None,
+                places: 1,
                 memory: 1 << 30,
             };
             preview(&path, &settings, &Progress::new()).expect("preview")
@@ -108,6 +109,7 @@ fn strips_of_three_colours_keep_to_their_lasers_and_any_cut_gives_the_same_fring
             part: None,
             wavelength: Some(wavelength),
             lamp: None,
+            places: 1,
             memory: 1 << 30,
         };
         let seen = preview(folder.path(), &settings, &Progress::new()).expect("preview");

@@ -21,6 +21,10 @@ const LATTICE: i64 = 4;
 /// Side of the field that is computed in the middle of each [px].
 const PATCH: i64 = 192;
 
+/// What is said of points.
+pub(super) const NOT_A_SCENE: &str =
+    "points are the same from everywhere: nothing hides anything; give a scene for true views";
+
 /// What a few small fields of the plate show.
 #[derive(Default)]
 struct Sample {
@@ -124,7 +128,7 @@ fn sample(fringes: &PlateFringes, progress: &Progress) -> Result<Sample> {
         if rect.area() == 0 {
             continue;
         }
-        let (field, work) = fringes.wave.field(&rect, &[Piece { segment, rect }], progress)?;
+        let (field, work) = fringes.field(&rect, &[Piece { segment, rect }], progress)?;
         if work.points > sample.most_points {
             (sample.most_points, busiest) = (work.points, Some(segment));
         }
@@ -143,7 +147,7 @@ fn sample(fringes: &PlateFringes, progress: &Progress) -> Result<Sample> {
             [(index * side).max(bounds[0]), ((index + 1) * side).min(bounds[1])]
         };
         let rect = Rect { x: span(segment[0], sides[0], area.x), y: span(segment[1], sides[1], area.y) };
-        let (field, work) = fringes.wave.field(&rect, &[Piece { segment, rect }], progress)?;
+        let (field, work) = fringes.field(&rect, &[Piece { segment, rect }], progress)?;
         sample.whole = work;
         let begin = Instant::now();
         fringes.levels(&field, &rect, 1.0);
@@ -162,7 +166,8 @@ fn sample(fringes: &PlateFringes, progress: &Progress) -> Result<Sample> {
     let [tiles_x, tiles_y] = tile_counts(plate);
     let per_tile = |side: u64| plate.file.tile.div_ceil(side) + u64::from(!plate.file.tile.is_multiple_of(side));
     let [wide, tall] = fringes.wave.plane.size;
-    sample.segments = tiles_x * tiles_y * per_tile(wide) * per_tile(tall);
+    let colors = plate.slit.as_ref().filter(|slit| slit.superimposed).map_or(1, |slit| slit.wavelengths.len() as u64);
+    sample.segments = tiles_x * tiles_y * per_tile(wide) * per_tile(tall) * colors;
     Ok(sample)
 }
 
@@ -276,7 +281,7 @@ fn warnings(fringes: &PlateFringes, plan: &Plan) -> Vec<String> {
         out.push("a phase of two levels has a conjugate image as bright as the object".into());
     }
     if !matches!(object, Object::Scene(_)) {
-        out.push("points are the same from everywhere: nothing hides anything; give a scene for true views".into());
+        out.push(NOT_A_SCENE.into());
     }
     if let Some(slit) = &plate.slit {
         let sine = plan.reference_frequencies[1][1].abs().max(plan.reference_frequencies[1][0].abs())

@@ -1,6 +1,7 @@
 //! A plate and all that decides its pixels.
 
 pub use super::fringe_settings::{Binarisation, FringeSettings, Polarity};
+use super::lamp::Lamp;
 use super::printer::Printer;
 use super::reference::Reference;
 use super::transfer::Transfer;
@@ -70,16 +71,27 @@ pub struct Plate {
     /// noise [m]; none for other fringes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub eye_box: Option<[f64; 2]>,
+    /// Columns and rows along the edge of the fringes over which they fade away [px]: a hard edge sends light of the lamp aside, and
+    /// some of it to where the object is.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub fade: u64,
     /// Largest relative error of the computed field.
     pub error: f64,
     /// Seed of phases, jitter and light.
     pub seed: u64,
+    /// The lamp that the finished plate is to be looked at with, where the profile tells: as wide and as coloured as that is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lamp: Option<Lamp>,
     /// The machine that prints it, where the profile tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub printer: Option<Printer>,
     /// What that machine makes of levels and lines, where it was measured; it is undone in the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub transfer: Option<Transfer>,
+}
+
+fn is_zero(value: &u64) -> bool {
+    *value == 0
 }
 
 impl Raster {

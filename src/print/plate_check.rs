@@ -2,7 +2,6 @@
 
 use super::plate::{Binarisation, Plate, Quantity, Raster};
 use crate::field::grid::LENGTHS;
-use crate::segments::PointPhase;
 
 /// Longest side of a plate [px]: 2.6 million would be 0.9 m at 0.35 µm.
 const LONGEST: u64 = 1 << 22;
@@ -47,6 +46,22 @@ impl Plate {
                     "slit: its strip must be 8 to the tile's {tile}, and its lengths those of a bench"
                 ));
             }
+            if slit.superimposed {
+                if slit.wavelengths.len() != 3 {
+                    return Err("slit.superimposed is for three wavelengths; give slit.wavelengths".into());
+                }
+                // What else a fringe or a pulse can be is made of one object's phase.
+                if self.fringe.quantity != Quantity::Bipolar
+                    || bits == 1 && self.fringe.binarisation == Binarisation::PulseWidth
+                {
+                    return Err(
+                        "slit.superimposed adds fringes: take quantity = \"bipolar\", and not pulse-width".into()
+                    );
+                }
+            }
+        }
+        if let Some(Err((name, what))) = self.lamp.as_ref().map(|lamp| lamp.check(self.wavelength)) {
+            return Err(format!("lamp: {name}: {what}"));
         }
         let searched = bits == 1 && self.fringe.binarisation == Binarisation::DirectSearch;
         match self.eye_box {
@@ -62,14 +77,20 @@ impl Plate {
         if searched && self.fringe.quantity != Quantity::Bipolar {
             return Err("direct-search makes the interference term alone; take quantity = \"bipolar\"".into());
         }
-        if self.view.phase == PointPhase::Path && self.slit.is_some() {
-            return Err("scene.phase = \"path\" is for full parallax; a slit's strips have phases of their own".into());
-        }
         if file.guard.saturating_mul(2) >= width.min(height) {
             return Err(format!("guard = {} on each side leaves no fringes of {width}×{height}", file.guard));
         }
         if file.marks > file.guard {
             return Err(format!("marks = {} do not fit into guard = {}; raise guard", file.marks, file.guard));
+        }
+        if self.fade > 0 && bits == 1 && self.fringe.binarisation != Binarisation::Diffusion {
+            return Err("fade is for 8 bits, or for binarisation = \"diffusion\"; leave it out".into());
+        }
+        if self.fade.saturating_add(file.guard).saturating_mul(2) > width.min(height) {
+            return Err(format!(
+                "fade = {} on each side is more than half of the fringes of {width}×{height}",
+                self.fade
+            ));
         }
         let lengths = [
             ("pitch", pitch_x),

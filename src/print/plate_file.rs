@@ -1,5 +1,6 @@
 //! Plates in TOML: a file of `calib/`, its keys, their units and their domains.
 
+use super::lamp::LampFile;
 use super::plate::{Binarisation, FileLayout, FringeSettings, Plate, Polarity, Quantity, Raster};
 use super::plate_size::{Asked, PlateSize, SizeKey, check_step};
 use super::printer::PrinterFile;
@@ -42,6 +43,8 @@ struct PlateFile {
     guard: u64,
     #[serde(default)]
     marks: u64,
+    #[serde(default)]
+    fade: u64,
     tile: Option<u64>,
     segment: Option<u64>,
     error: Option<f64>,
@@ -49,6 +52,7 @@ struct PlateFile {
     seed: u64,
     reference: Option<ReferenceFile>,
     slit: Option<SlitFile>,
+    lamp: Option<LampFile>,
     printer: Option<PrinterFile>,
     transfer: Option<TransferFile>,
     scene: SceneFile,
@@ -95,6 +99,8 @@ struct SlitFile {
     y: Option<String>,
     strip: Option<u64>,
     wavelengths: Option<Vec<String>>,
+    #[serde(default)]
+    superimposed: bool,
 }
 
 impl Plate {
@@ -214,7 +220,7 @@ impl Plate {
                 }
                 let y = slit.y.as_deref().map_or(Ok(0.0), |text| at.read("slit.y", text, units::length))?;
                 let height = at.read("slit.height", &slit.height, units::positive_length)?;
-                Some(Slit { y, height, strip, wavelengths })
+                Some(Slit { y, height, strip, wavelengths, superimposed: slit.superimposed, only: None })
             }
         };
         let object_angle = match &scene.object_angle {
@@ -274,8 +280,10 @@ impl Plate {
             },
             object_angle,
             eye_box,
+            fade: file.fade,
             error: at.within("error", file.error.unwrap_or(if file.bits == 1 { 1e-2 } else { 5e-3 }), 1e-4..=0.1)?,
             seed: file.seed,
+            lamp: file.lamp.as_ref().map(|lamp| lamp.read(at)).transpose()?,
             printer: file.printer.as_ref().map(|printer| printer.read(at)).transpose()?,
             transfer: file.transfer.as_ref().map(|transfer| transfer.read(at)).transpose()?,
         };

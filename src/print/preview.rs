@@ -40,6 +40,8 @@ pub struct PreviewSettings {
     pub wavelength: Option<f64>,
     /// How wide and how coloured the lamp is; a distant point of one wavelength where `None`.
     pub lamp: Option<Lamp>,
+    /// Places and wavelengths of such a lamp that are looked at.
+    pub places: usize,
     /// Memory that it may take [bytes].
     pub memory: u64,
 }
@@ -86,7 +88,7 @@ pub fn preview(folder: &Path, settings: &PreviewSettings, progress: &Progress) -
     let Some(lamp) = &settings.lamp else { return lit(folder, settings, &[[0.0; 2]], progress) };
     let wavelength = settings.wavelength.map_or_else(|| Ok(Reader::open(folder)?.plate().wavelength), Ok)?;
     let mut sum: Option<Preview> = None;
-    for LampLight { wavelength, share, tilts } in lamp.light(wavelength)? {
+    for LampLight { wavelength, share, tilts } in lamp.light(wavelength, settings.places)? {
         let settings = PreviewSettings { wavelength: Some(wavelength), ..settings.clone() };
         let mut seen = lit(folder, &settings, &tilts, progress)?;
         seen.picture.values.iter_mut().for_each(|v| *v *= share as f32);

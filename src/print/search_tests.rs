@@ -112,7 +112,12 @@ fn threads_do_not_change_a_search_and_what_it_cannot_serve_is_refused() {
         ("bits = 1", "bits = 1\nquantity = \"intensity\"", "bipolar"),
         ("direct-search\"", "diffusion\"\neye_box = 1", "eye_box"),
         ("distance = \"5mm\"", "distance = \"5mm\"\neye_box = [\"0mm\", \"5mm\"]", "scene.eye_box"),
-        ("distance = \"5mm\"", "distance = \"5mm\"\nphase = \"path\"\n[slit]\nheight = \"1mm\"", "scene.phase"),
+        (
+            "distance = \"5mm\"",
+            "distance = \"5mm\"\n[slit]\nheight = \"1mm\"\nsuperimposed = true",
+            "slit.superimposed",
+        ),
+        ("distance = \"5mm\"", "distance = \"5mm\"\n[lamp]\ndiameter = \"2m\"\ndistance = \"1m\"", "farther than wide"),
         ("distance = \"5mm\"", "distance = \"5mm\"\n[transfer]\nline_bias = \"0.1um\"", "direct search"),
     ] {
         let refused = read(&text.replacen(from, to, 1)).expect_err(to).to_string();

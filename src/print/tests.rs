@@ -252,6 +252,7 @@ fn previews_show_points_where_they_are_from_every_eye_and_file() {
                     part: None,
                     wavelength: None,
                     lamp: None,
+                    places: 1,
                     memory: 1 << 30,
                 };
                 let seen = preview(&path, &settings, &Progress::new()).expect("preview");
@@ -272,6 +273,7 @@ fn previews_show_points_where_they_are_from_every_eye_and_file() {
             part: Some([0, 0, 769, 4]),
             wavelength: None,
             lamp: None,
+            places: 1,
             memory: 1 << 30,
         };
         assert!(preview(&path, &wrong, &Progress::new()).unwrap_err().to_string().contains("not on the plate"));

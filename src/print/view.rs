@@ -1,14 +1,18 @@
 //! How a finished plate looks to an eye, in the light of its lamps, and how it should by ray tracing.
 
+use super::flat_target::target;
 use super::lamp::Lamp;
-use super::manifest::{Manifest, Settings};
+use super::manifest::{Manifest, NOT_THE_INPUT, Settings};
+use super::plate::Plate;
 use super::preview::{Preview, PreviewSettings, preview};
+use super::source::{PictureFiles, Source};
 use crate::error::{Error, Result};
 use crate::points::colour::Lasers;
 use crate::progress::Progress;
 use crate::reconstruction::metrics::{Likeness, blocks, likeness};
 use crate::reconstruction::{ColorPicture, Picture, Scale, write_rgb_png};
 use crate::segments::{Object, PlacedScene};
+use glam::DVec3;
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
@@ -107,8 +111,33 @@ impl PlateView {
         self.color.as_ref().map_or_else(|| self.gray.picture.clone(), ColorPicture::luminance)
     }
 
+    /// What is seen, in linear light; gray in the light of one lamp.
+    pub fn picture(&self) -> ColorPicture {
+        self.color.clone().unwrap_or_else(|| gray(&self.gray.picture))
+    }
+
+    /// Columns and rows of the picture.
+    pub fn size(&self) -> (usize, usize) {
+        (self.gray.picture.width, self.gray.picture.height)
+    }
+
+    /// The plate.
+    pub fn plate(&self) -> &Plate {
+        &self.settings.plate
+    }
+
+    /// Diameter of the pupil [m].
+    pub fn pupil(&self) -> f64 {
+        self.pupil
+    }
+
+    /// Names of the files that the plate was made of.
+    pub(super) fn inputs(&self) -> Vec<String> {
+        self.settings.inputs.iter().map(|input| input.name.clone()).collect()
+    }
+
     /// Texts of a picture's file.
-    fn texts(&self, what: &str) -> [(&'static str, String); 2] {
+    pub(super) fn texts(&self, what: &str) -> [(&'static str, String); 2] {
         let ViewReport { eye, focus, wavelengths, center, half, .. } = &self.report;
         let mut described = serde_json::json!({
             "simulated": true,
@@ -137,30 +166,65 @@ impl PlateView {
         }
     }
 
-    /// Traces what the same eye should see of the plate's own scene, writes it, and says in the report how alike both are:
-    /// cell by cell, and over 4 × 4 cells, which hold less speckle.
+    /// Writes the picture below words that say what it is.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write_labelled(&self, path: &Path, share: f64) -> Result<()> {
+        let texts = self.texts("simulated view of a plate's fringes");
+        self.labelled(self.white(share)).write_png(path, &texts)
+    }
+
+    /// What the same eye should see, and its white.
+    fn target(&self, of: &Source, progress: &Progress) -> Result<(ColorPicture, f32)> {
+        let plate = &self.settings.plate;
+        match (of, self.settings.pictures()) {
+            (Source::Pictures(PictureFiles { files, .. }), Some(depths)) => {
+                let pictures = PictureFiles { files: files.clone(), depths };
+                self.settings.check_pictures(&pictures)?;
+                let viewer = DVec3::new(0.0, 0.0, plate.view.viewer);
+                let eye = DVec3::from_array(self.report.eye);
+                Ok((target(&pictures.points(plate)?, viewer, eye, &self.gray), 1.0))
+            }
+            (Source::File(scene), None) => {
+                let options = self.settings.options_for(scene)?;
+                let Object::Scene(scene) = Object::read(scene, &options, &plate.segments()?, progress)? else {
+                    return Err(Error::parameter("traced", "points cannot be traced; give the scene"));
+                };
+                Ok((traced(&scene, self.report.eye, &self.gray, plate.seed, progress)?, scene.white()))
+            }
+            (of, _) => Err(Error::input(of.path(), NOT_THE_INPUT)),
+        }
+    }
+
+    /// Traces what the same eye should see of the plate's own scene, writes it, below words where it is not to be bare, and says in
+    /// the report how alike both are: cell by cell, and over 4 × 4 cells, which hold less speckle.
     ///
     /// # Errors
     /// [`Error::Input`] when the scene is not the one that the plate was made of; [`Error::Parameter`] for points, which hide
     /// nothing, and for an eye so far aside that too many rays would be cast; those of the scene and its light;
     /// [`Error::Io`].
-    pub fn compare(&mut self, scene: &Path, path: &Path, progress: &Progress) -> Result<[Likeness; 2]> {
-        let options = self.settings.options_for(scene)?;
-        let plate = &self.settings.plate;
-        let Object::Scene(scene) = Object::read(scene, &options, &plate.segments()?, progress)? else {
-            return Err(Error::parameter("traced", "points cannot be traced; give the scene"));
-        };
-        let (traced, white) = (traced(&scene, self.report.eye, &self.gray, plate.seed, progress)?, scene.white());
+    pub fn compare(&mut self, of: &Source, path: &Path, bare: bool, progress: &Progress) -> Result<[Likeness; 2]> {
+        let (traced, white) = self.target(of, progress)?;
         let texts = self.texts("traced view from the same eye");
         let (seen, target) = (self.luminance(), traced.luminance());
+        let alike = [likeness(&seen, &target, white), likeness(&blocks(&seen, 4), &blocks(&target, 4), white)];
+        (self.report.likeness, self.report.likeness_of_blocks) = (Some(alike[0]), Some(alike[1]));
         match &self.color {
+            _ if !bare => {
+                let shown = if self.color.is_some() { traced } else { gray(&target) };
+                self.traced_with_words(&shown, white).write_png(path, &texts)?;
+            }
             None => target.write_png(path, Scale::White(white), &texts)?,
             Some(_) => write_rgb_png(path, traced.width, traced.height, &traced.rgb, white, &texts)?,
         }
-        let alike = [likeness(&seen, &target, white), likeness(&blocks(&seen, 4), &blocks(&target, 4), white)];
-        (self.report.likeness, self.report.likeness_of_blocks) = (Some(alike[0]), Some(alike[1]));
         Ok(alike)
     }
+}
+
+fn gray(picture: &Picture) -> ColorPicture {
+    let Picture { width, height, values } = picture;
+    ColorPicture { width: *width, height: *height, rgb: values.iter().map(|v| [*v; 3]).collect() }
 }
 
 /// The picture that an eye at `eye` [m] should see of a scene where a preview stands.

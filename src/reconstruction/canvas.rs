@@ -1,6 +1,6 @@
 //! Pictures with words: contact sheets, overviews and the operator's view; still, or moving as an animated PNG.
 
-use super::picture::{refused, write_coded_png};
+use super::picture::{encode, refused, write_coded_png};
 use crate::error::{Error, Result};
 use crate::files;
 use std::path::Path;
@@ -77,6 +77,17 @@ impl Canvas {
     /// [`crate::Error::Io`].
     pub fn write_png(&self, path: &Path, texts: &[(&str, String)]) -> Result<()> {
         write_coded_png(path, self.width, self.height, self.pixels.as_flattened(), texts)
+    }
+
+    /// The bytes of such a PNG.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for what a PNG cannot hold.
+    pub fn png(&self, texts: &[(&str, String)]) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        encode(&mut bytes, self.width, self.height, png::ColorType::Rgb, self.pixels.as_flattened(), texts)
+            .map_err(|e| Error::parameter("picture", e.to_string()))?;
+        Ok(bytes)
     }
 
     /// Writes canvases of one size as an animated PNG (8 bits, gray where all of it is) that plays again and again, each shown for

@@ -5,6 +5,7 @@ use crate::field::Grid;
 use crate::files::{self, pictures};
 use crate::scene::texture::srgb_from_linear;
 use glam::DVec2;
+use std::io::Write;
 use std::path::Path;
 
 /// A picture of linear light, row 0 on top.
@@ -134,19 +135,28 @@ fn write_png(
     bytes: &[u8],
     texts: &[(&str, String)],
 ) -> Result<()> {
-    files::write_whole(path, |out| {
-        let refused = |e| refused(path, e);
-        let mut encoder = png::Encoder::new(out, width as u32, height as u32);
-        encoder.set_color(color);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
-        for (keyword, text) in texts {
-            encoder.add_itxt_chunk((*keyword).into(), text.clone()).map_err(refused)?;
-        }
-        let mut writer = encoder.write_header().map_err(refused)?;
-        writer.write_image_data(bytes).map_err(refused)?;
-        writer.finish().map_err(refused)
-    })
+    files::write_whole(path, |out| encode(out, width, height, color, bytes, texts).map_err(|e| refused(path, e)))
+}
+
+/// Encodes 8-bit pixels as a PNG, sRGB, with text chunks (keyword, text).
+pub(super) fn encode(
+    out: impl Write,
+    width: usize,
+    height: usize,
+    color: png::ColorType,
+    bytes: &[u8],
+    texts: &[(&str, String)],
+) -> std::result::Result<(), png::EncodingError> {
+    let mut encoder = png::Encoder::new(out, width as u32, height as u32);
+    encoder.set_color(color);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    for (keyword, text) in texts {
+        encoder.add_itxt_chunk((*keyword).into(), text.clone())?;
+    }
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(bytes)?;
+    writer.finish()
 }
 
 /// Reads a gray (or the luminance of a colour) picture of 8 or 16 bits as it is stored, 0 … 1: columns, rows, values.

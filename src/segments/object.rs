@@ -6,7 +6,7 @@ use super::slit::{LinePoint, Strip};
 use crate::error::{Error, Result};
 use crate::illumination::{Illumination, IlluminationSettings};
 use crate::points::colour::Lasers;
-use crate::points::{Channel, PointSource, clouds, ply};
+use crate::points::{Channel, PointCloud, PointSource, clouds, ply};
 use crate::progress::Progress;
 use crate::scene::environment::Panorama;
 use crate::scene::{SceneBvh, gltf};
@@ -114,19 +114,24 @@ impl Object {
             let what = "its points stand in the scene's own metres; write them in the hologram frame";
             return Err(Error::input(path, what));
         }
+        Self::of_cloud(&read.cloud, plane)?.ok_or_else(|| Error::input(path, "has no points that shine"))
+    }
+
+    /// Points as a plane's lamps show them; none where no point shines.
+    ///
+    /// # Errors
+    /// As [`Lasers::new`].
+    pub(crate) fn of_cloud(cloud: &PointCloud, plane: &Segments) -> Result<Option<Self>> {
         let lamps = plane.slit.as_ref().map_or(&[][..], |slit| &slit.wavelengths);
         let object = match lamps {
             &[a, b, c] => {
                 let lasers = Lasers::new([a, b, c])?;
-                Self::ColorPoints([0, 1, 2].map(|index| lasers.points(&read.cloud, index)))
+                Self::ColorPoints([0, 1, 2].map(|index| lasers.points(cloud, index)))
             }
-            _ => Self::Points(read.cloud.channel(Channel::Luminance)),
+            _ => Self::Points(cloud.channel(Channel::Luminance)),
         };
-        if object.clouds().iter().flatten().any(|p| p.amplitude > 0.0) {
-            Ok(object)
-        } else {
-            Err(Error::input(path, "has no points that shine"))
-        }
+        let shines = object.clouds().iter().flatten().any(|p| p.amplitude > 0.0);
+        Ok(shines.then_some(object))
     }
 
     /// The points of each laser, or of one; none of a scene.

@@ -83,6 +83,12 @@ pub struct Slit {
     pub strip: u64,
     /// Wavelengths of the strips, which take turns from the top [m].
     pub wavelengths: Vec<f64>,
+    /// Strips do not take turns: each has the fringes of all wavelengths, one over the other.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub superimposed: bool,
+    /// Which of superimposed wavelengths is computed; the first where `None`.
+    #[serde(skip)]
+    pub(crate) only: Option<usize>,
 }
 
 impl Slit {
@@ -93,8 +99,11 @@ impl Slit {
 
     /// The wavelength of a strip, numbered from the top [m].
     pub(super) fn wavelength_of_strip(&self, strip: i64) -> f64 {
-        let turn = strip.rem_euclid(self.wavelengths.len().max(1) as i64);
-        self.wavelengths.get(turn as usize).copied().unwrap_or_default()
+        let turn = match self.superimposed {
+            true => self.only.unwrap_or(0),
+            false => strip.rem_euclid(self.wavelengths.len().max(1) as i64) as usize,
+        };
+        self.wavelengths.get(turn).copied().unwrap_or_default()
     }
 
     /// Largest |sin β| of light from a plane of a height [m] to the slit at a distance [m].

@@ -255,18 +255,12 @@ impl PlacedScene {
         };
         let cells = summed(seen.iter().filter_map(light).collect());
         if path {
-            // Cells one behind the other are one surface: from the eye their waves add up in step.
-            let cells: Vec<(u64, f64)> = cells.collect();
-            for run in cells.chunk_by(|a, b| a.0 + 1 == b.0) {
-                let whole: f64 = run.iter().map(|(_, power)| power).sum();
-                for &(key, power) in run.iter().filter(|(_, power)| *power > 0.0) {
-                    let [x, y, z] = [42, 21, 0].map(|shift| self.middle(key, shift));
-                    let position = self.hologram_from_lattice(plane, eye, DVec3::new(x, y, z));
-                    if (position.z > 0.0) != front {
-                        continue;
-                    }
+            for (key, amplitude) in in_step(cells) {
+                let [x, y, z] = [42, 21, 0].map(|shift| self.middle(key, shift));
+                let position = self.hologram_from_lattice(plane, eye, DVec3::new(x, y, z));
+                if (position.z > 0.0) == front {
                     let phase = Phase::Path.of(0, (eye - position).length(), plane.wavelength);
-                    points.push(PointSource { position, amplitude: (power / whole.sqrt()) as f32, phase });
+                    points.push(PointSource { position, amplitude, phase });
                 }
             }
             return Ok(());
@@ -285,20 +279,20 @@ impl PlacedScene {
 
     /// Where a place of the hologram frame lies on the lattice of [`PointPhase::Path`] [m]: its direction from the eye, as a
     /// length at the scene's nearest depth, and its depth, `LAYER` times as coarse.
-    fn lattice_from_hologram(&self, plane: &Segments, eye: DVec3, place: DVec3) -> DVec3 {
+    pub(super) fn lattice_from_hologram(&self, plane: &Segments, eye: DVec3, place: DVec3) -> DVec3 {
         let scale = self.cell / plane.view.resolution.tan() / (eye.z - place.z);
         DVec3::new(scale * place.x, scale * place.y, place.z / LAYER)
     }
 
     /// The inverse of [`Self::lattice_from_hologram`].
-    fn hologram_from_lattice(&self, plane: &Segments, eye: DVec3, place: DVec3) -> DVec3 {
+    pub(super) fn hologram_from_lattice(&self, plane: &Segments, eye: DVec3, place: DVec3) -> DVec3 {
         let z = place.z * LAYER;
         let scale = self.cell / plane.view.resolution.tan() / (eye.z - z);
         DVec3::new(place.x / scale, place.y / scale, z)
     }
 
     /// The middle of the cell whose index begins at a bit of a key [m].
-    fn middle(&self, key: u64, shift: u32) -> f64 {
+    pub(super) fn middle(&self, key: u64, shift: u32) -> f64 {
         let index = (key >> shift & ((1 << 21) - 1)) as f64 - f64::from(1 << 20);
         (index + 0.5) * self.cell
     }
@@ -314,6 +308,19 @@ impl PlacedScene {
         let index = (key >> shift & ((1 << 21) - 1)) as f64 - f64::from(1 << 20);
         (index + random.uniform()) * self.cell
     }
+}
+
+/// Amplitudes of cells whose lowest bits number depths: those one behind the other are one surface, and from the eye their
+/// waves add up in step.
+pub(super) fn in_step(cells: impl Iterator<Item = (u64, f64)>) -> Vec<(u64, f32)> {
+    let cells: Vec<(u64, f64)> = cells.collect();
+    let mut lit = Vec::with_capacity(cells.len());
+    for run in cells.chunk_by(|a, b| a.0 + 1 == b.0) {
+        let whole: f64 = run.iter().map(|(_, power)| power).sum();
+        let bright = run.iter().filter(|(_, power)| *power > 0.0);
+        lit.extend(bright.map(|&(key, power)| (key, (power / whole.sqrt()) as f32)));
+    }
+    lit
 }
 
 /// Cells with the sums of what lies in each.

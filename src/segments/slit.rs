@@ -98,9 +98,14 @@ impl Strip {
         }
     }
 
+    /// Distance of the slit's middle along the strip's plane [m].
+    pub(super) fn length(&self) -> f64 {
+        self.rise.hypot(self.distance)
+    }
+
     /// sin β and cos β of the strip's plane.
     pub(super) fn inclination(&self) -> [f64; 2] {
-        let length = self.rise.hypot(self.distance);
+        let length = self.length();
         [self.rise / length, self.distance / length]
     }
 
@@ -239,7 +244,7 @@ mod tests {
 
     fn plane(y: f64, height: f64, strip: u64) -> (Segments, Slit) {
         let grid = Grid::new(320, 704, 0.8e-6, 0.8e-6).expect("grid");
-        let slit = Slit { y, height, strip, wavelengths: vec![638e-9] };
+        let slit = Slit { y, height, strip, wavelengths: vec![638e-9], superimposed: false, only: None };
         let view = Viewing { viewer: 15e-3, place: -2e-3, ..Viewing::default() };
         let size = [64, strip];
         let plane = Segments::of_panel(grid, 638e-9, 64).expect("segments");

@@ -96,7 +96,7 @@ impl ObjectWave {
         let pieces = self.plane.pieces(&rect, &rect);
         progress.start("views", pieces.len() as u64);
         for piece in pieces {
-            self.add(&piece, &rect, &mut field.samples, &mut work, progress)?;
+            self.add(&self.plane, &piece, &rect, &mut field.samples, &mut work, progress)?;
             progress.advance(1);
         }
         if work.points == 0 {
@@ -110,10 +110,38 @@ impl ObjectWave {
     /// # Errors
     /// As [`hologram::plan`] and [`hologram::compute`]; [`Error::Interrupted`].
     pub fn field(&self, rect: &Rect, pieces: &[Piece], progress: &Progress) -> Result<(Vec<Complex32>, Work)> {
+        self.field_on(&self.plane, rect, pieces, progress)
+    }
+
+    /// The same of one of a slit's superimposed wavelengths.
+    ///
+    /// # Errors
+    /// As [`Self::field`].
+    pub(crate) fn field_of(
+        &self,
+        wavelength: usize,
+        rect: &Rect,
+        pieces: &[Piece],
+        progress: &Progress,
+    ) -> Result<(Vec<Complex32>, Work)> {
+        let mut plane = self.plane.clone();
+        if let Some(slit) = &mut plane.slit {
+            slit.only = Some(wavelength);
+        }
+        self.field_on(&plane, rect, pieces, progress)
+    }
+
+    fn field_on(
+        &self,
+        plane: &Segments,
+        rect: &Rect,
+        pieces: &[Piece],
+        progress: &Progress,
+    ) -> Result<(Vec<Complex32>, Work)> {
         let mut field = vec![Complex32::default(); rect.area()];
         let mut work = Work { pixels: rect.area() as u64, ..Work::default() };
         for piece in pieces {
-            self.add(piece, rect, &mut field, &mut work, progress)?;
+            self.add(plane, piece, rect, &mut field, &mut work, progress)?;
         }
         Ok((field, work))
     }
@@ -121,13 +149,13 @@ impl ObjectWave {
     /// Puts the field of a piece into that of a rectangle.
     fn add(
         &self,
+        plane: &Segments,
         piece: &Piece,
         rect: &Rect,
         field: &mut [Complex32],
         work: &mut Work,
         progress: &Progress,
     ) -> Result<()> {
-        let plane = &self.plane;
         let quiet = progress.part();
         let begin = Instant::now();
         let mut seen = |count: usize| {

@@ -37,9 +37,9 @@ pub(crate) use panels::{PanelsArgs, PlatesArgs};
 pub(crate) use parse::Ahead;
 #[cfg(feature = "display")]
 pub(crate) use parse::position;
-pub(crate) use parse::{Wavelengths, White};
+pub(crate) use parse::{LampAsked, Wavelengths, White};
 pub(crate) use placement::{DepthMapArgs, PlacementArg, PlacementArgs};
-pub(crate) use print::{ExportArgs, PreviewArgs, PrintArgs, PrintCommand, VerifyArgs};
+pub(crate) use print::{ExportArgs, LookArgs, PreviewArgs, PrintArgs, PrintCommand, SheetArgs, VerifyArgs};
 pub(crate) use scene::{FileArgs, SceneArgs};
 pub(crate) use serve::{ServeArgs, ServedLevelsArg};
 pub(crate) use show::{DEFAULT_OUTPUT, ShowArgs};

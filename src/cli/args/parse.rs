@@ -63,11 +63,23 @@ pub(crate) fn position(text: &str) -> Result<[f64; 3], String> {
 }
 
 /// Diameter and distance of a lamp [m].
-pub(super) fn lamp(text: &str) -> Result<[f64; 2], String> {
-    let (diameter, distance) = text.split_once(',').ok_or("give diameter and distance such as 2mm,300mm")?;
+/// The lamp that a plate is looked at with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum LampAsked {
+    /// A distant point of one wavelength.
+    Laser,
+    /// Diameter and distance [m].
+    Of([f64; 2]),
+}
+
+pub(super) fn lamp(text: &str) -> Result<LampAsked, String> {
+    if text == "laser" {
+        return Ok(LampAsked::Laser);
+    }
+    let (diameter, distance) = text.split_once(',').ok_or("give diameter and distance such as 2mm,300mm, or laser")?;
     let diameter = units::length(diameter.trim()).map_err(|e| e.to_string())?;
     let distance = units::positive_length(distance.trim()).map_err(|e| e.to_string())?;
-    Ok([diameter, distance])
+    Ok(LampAsked::Of([diameter, distance]))
 }
 
 /// Which three lasers.

@@ -3,7 +3,7 @@
 use crate::errors::Raise;
 use crate::frame::loaded;
 use crate::run::run;
-use holodrive::print::{Asked, Plate, PlateJob, PrintSettings, Shard};
+use holodrive::print::{Asked, Plate, PlateJob, PrintSettings, Shard, Source};
 use holodrive::segments::SceneOptions;
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -34,7 +34,14 @@ pub(crate) fn print_plate(
     };
     let told = run(py, progress, |progress| {
         let plate = Plate::find(&plate.to_string_lossy(), &Asked::default())?;
-        let settings = PrintSettings { plate, input: source, options: SceneOptions::default(), folder, shard, dry_run };
+        let settings = PrintSettings {
+            plate,
+            input: Source::File(source),
+            options: SceneOptions::default(),
+            folder,
+            shard,
+            dry_run,
+        };
         let mut job = PlateJob::new(settings, progress)?;
         let plan = job.plan(progress)?;
         if dry_run {

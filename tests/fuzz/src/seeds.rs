@@ -9,7 +9,7 @@ use holodrive::field::{Complex32, Grid, npy};
 use holodrive::glam::{DVec2, DVec3};
 use holodrive::light_field::{EyeGrid, LightField};
 use holodrive::panel::{Frame, PanelProfile};
-use holodrive::print::{Manifest, Plate, Settings};
+use holodrive::print::{Manifest, Plate, Settings, Source};
 use holodrive::segments::SceneOptions;
 use image::ImageFormat;
 use serde_json::{Value, json};
@@ -442,7 +442,7 @@ pub fn texts(folder: &Path, begins: &str, plates: bool) -> Seeds {
 pub fn manifests(root: &Path) -> Seeds {
     let plate = Plate::read(&root.join("calib/plate-small.toml"))?;
     let input = root.join("scenes/cornell.gltf");
-    let settings = Settings::new(&plate, &input, &SceneOptions::default())?;
+    let settings = Settings::new(&plate, &Source::File(input), &SceneOptions::default())?;
     let folder = tempfile::tempdir()?;
     let whole =
         json!({"settings": settings, "instruction_set": "scalar", "amplitude": 1.0, "white": 1.0, "tiles": ["00"]});
