@@ -96,6 +96,7 @@ fn a_job_sheet_is_one_page_with_all_that_a_print_shop_asks() {
     let f = folder.path();
     prepare(f);
     let report = done(f, &["print", "sheet", "plate", "--places", "6", "-o", "sheet.html"]);
+    refused(f, &["print", "sheet", "plate", "-o", "sheet.pdf"], "ends in .html");
     // Without flags the plate's viewer looks at its scene in the light of its lamp.
     assert_eq!(report["eye"], serde_json::json!([0.0, 0.0, 0.04]));
     assert_eq!((report["focus"].as_f64(), report["lamp"]["diameter"].as_f64()), (Some(-6e-3), Some(2e-3)));
