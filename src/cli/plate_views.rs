@@ -146,6 +146,11 @@ pub(super) fn preview(args: &PreviewArgs) -> Result<Report> {
 }
 
 pub(super) fn sheet(args: &SheetArgs) -> Result<Report> {
+    let is_page = |ending: &std::ffi::OsStr| ["html", "htm"].iter().any(|known| ending.eq_ignore_ascii_case(known));
+    if !args.output.extension().is_some_and(is_page) {
+        let what = format!("{}: a job sheet is a page whose name ends in .html", args.output.display());
+        return Err(Error::parameter("output", what));
+    }
     let mut report = Report::new("print sheet");
     let bar = Bar::new();
     let (view, _) = look(&args.look, &mut report, &bar.progress)?;
