@@ -25,7 +25,7 @@
 //!
 //! Where there are no such sockets (Windows), or at another machine, the same is spoken over TCP. The server writes where, and a
 //! key, into a file that its user alone may read (`NAME.port`); the client's first line is `{"key": "…"}`, and without it
-//! nothing is told. There is no common memory then: the greeting has no `buffer`, a request with an array is answered with
+//! nothing is told (from another machine key and frames cross the network as they are, not encrypted). There is no common memory then: the greeting has no `buffer`, a request with an array is answered with
 //! `{"send": BYTES}`, upon which the client sends the array's bytes, little-endian.
 //!
 //! # Why it is made so
@@ -70,9 +70,8 @@ pub(super) fn check(array: ArrayType, panel: &ServedPanel) -> Result<(), String>
     }
 }
 
-/// Copies a frame out of an array.
+/// Copies a frame out of an array that the panel can show ([`check`]).
 pub(super) fn take(array: ArrayType, panel: &ServedPanel, source: &mut impl Source) -> Result<SentFrame, String> {
-    check(array, panel)?;
     let pixels = panel.pixels();
     Ok(match array.dtype {
         Dtype::Uint8 => panel.take(read::<u8>(source, pixels)?.into_iter().map(u16::from).collect())?,

@@ -143,7 +143,7 @@ impl Drop for Buffer {
 #[cfg(test)]
 mod tests {
     use super::super::SentFrame;
-    use super::super::local::take;
+    use super::super::local::{check, take};
     use super::super::local_request::{ArrayType, Dtype, Quantity};
     use super::*;
     use crate::panel::Modulation;
@@ -203,9 +203,9 @@ mod tests {
         buffer.file.write_all_at(&[0xFF; 30], 0).expect("write");
         let why = take(array(Quantity::Levels, Dtype::Uint16), &phase, &mut &buffer).expect_err("levels of 16 bits");
         assert!(why.contains("1023"), "{why}");
-        let why = take(array(Quantity::Amplitude, Dtype::Float32), &phase, &mut &buffer).expect_err("a phase panel");
+        let why = check(array(Quantity::Amplitude, Dtype::Float32), &phase).expect_err("a phase panel");
         assert!(why.contains("modulates phase"), "{why}");
-        let why = take(array(Quantity::Phase, Dtype::Float32), &panel(Modulation::Amplitude), &mut &buffer);
+        let why = check(array(Quantity::Phase, Dtype::Float32), &panel(Modulation::Amplitude));
         assert!(why.expect_err("an amplitude panel").contains("modulates amplitude"));
         buffer.file.set_len(59).expect("cut");
         let why = take(array(Quantity::Phase, Dtype::Float32), &phase, &mut &buffer).expect_err("15 values of 4 bytes");

@@ -1,5 +1,7 @@
 //! Plates as a user meets them: the same bytes whoever computed which tile, independent readers, a real scheduler.
 
+mod sheet;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

@@ -1,34 +1,9 @@
 //! Finished plates for people: pictures with words, both eyes, a walk past, a job sheet; read back by this test's own code.
 
+use super::{done, holodrive, refused};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn holodrive(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_holodrive")).args(arguments).current_dir(folder).output().expect("runs")
-}
-
-fn done(folder: &Path, arguments: &[&str]) -> serde_json::Value {
-    let out = holodrive(folder, &[arguments, &["--json"]].concat());
-    assert!(out.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&out.stderr));
-    serde_json::from_slice(&out.stdout).expect("JSON")
-}
-
-/// Bad input ends in exit code 2, one line that says `expected`, and no new file.
-fn refused(folder: &Path, arguments: &[&str], expected: &str) {
-    let names = || {
-        let mut names: Vec<_> = fs::read_dir(folder).expect("folder").map(|e| e.expect("entry").file_name()).collect();
-        names.sort();
-        names
-    };
-    let before = names();
-    let out = holodrive(folder, arguments);
-    let said = String::from_utf8_lossy(&out.stderr);
-    let lines: Vec<&str> = said.lines().filter(|l| !l.starts_with("warning:")).collect();
-    assert_eq!(out.status.code(), Some(2), "{arguments:?}: {said}");
-    assert!(lines.len() == 1 && lines[0].contains(expected), "{arguments:?} did not say `{expected}`: {said}");
-    assert_eq!(names(), before, "{arguments:?} left something");
-}
+use std::process::Command;
 
 /// Bytes of base64 text.
 fn decoded(text: &str) -> Vec<u8> {
