@@ -151,6 +151,11 @@ impl PanelModel {
         Some(light)
     }
 
+    /// Standard deviation of the Gaussian that blends neighbours [pixels].
+    pub(super) fn crosstalk(&self) -> f64 {
+        self.crosstalk
+    }
+
     /// Whether neighbours blend.
     pub(super) fn blends(&self) -> bool {
         self.crosstalk > 0.0

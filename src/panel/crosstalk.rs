@@ -20,6 +20,11 @@ pub(crate) fn blurred(values: &[f32], width: usize, sigma: f64) -> Vec<f32> {
     convolved(values, width, &gaussian(sigma))
 }
 
+/// Values of an array of that width smoothed by binomial weights, of a standard deviation of one sample.
+pub(crate) fn smoothed(values: &[f32], width: usize) -> Vec<f32> {
+    convolved(values, width, &[6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0])
+}
+
 /// The same by half of a kernel's weights, the middle one first.
 fn convolved(values: &[f32], width: usize, kernel: &[f32]) -> Vec<f32> {
     let (reach, height) = (kernel.len() - 1, values.len() / width);

@@ -58,8 +58,8 @@ fn a_hidden_bench_is_told_by_a_dot_card_and_ten_patterns() {
     let calibrated = PanelProfile::read(&path).expect("read");
     let [perfect, before, after] = eye::seen(&bench, &profile, &calibrated, errors.tilt, 100);
     println!("perfect panel {perfect:.2} dB, before {before:.2} dB, after {after:.2} dB");
-    // A panel whose pixels run into each other shows less than a perfect one, but far more than before.
-    assert!(after > before + 6.0, "{perfect} {before} {after}");
+    // A dim border, light that stays unmodulated and pixels that run into each other cost next to nothing once they are known.
+    assert!(after > before + 6.0 && after > perfect - 1.5, "{perfect} {before} {after}");
     // A picture in the focal plane: what the profile does not know of the bench is corrected by photos.
     let ([model, photographed], report) = in_loop::corrected(&bench, &calibrated, &fit.camera, errors.tilt, 16);
     println!("{model:.2} dB by the model, {photographed:.2} dB by photos; {report:?}");

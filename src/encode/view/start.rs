@@ -1,6 +1,7 @@
 //! Where the descent starts: the picture itself, on waves that converge on places of the eye box.
 
 use super::ViewTarget;
+use super::aside::{Aside, is_smooth};
 use super::spots::Spots;
 use crate::encode::model::PanelModel;
 use crate::error::Result;
@@ -27,8 +28,7 @@ pub fn carried_over(wishes: &[f32], setup: &Setup, wavelength: f64, from: DVec3,
 }
 
 /// Phases of waves that converge on spots of the eye box ([`Spots`]), together as bright on each pixel as
-/// the pictures are there to eyes in those places [rad]: two phases φ ± arccos(a) for one amplitude a, as in double phase, whose
-/// unwanted light goes far beside the eye ([`Stripes`]). From waves of one brightness dark places would take most steps to become dark. What is
+/// the pictures are there to eyes in those places [rad]: the phases of their amplitudes ([`Aside`]). From waves of one brightness dark places would take most steps to become dark. What is
 /// brighter than the brightest part of one picture times the root of the number of waves is cut.
 ///
 /// # Errors
@@ -47,9 +47,9 @@ pub(super) fn converging(
         Ok(Wave::new(target, targets, &grid, *spot, random))
     };
     let waves = spots.iter().map(wave).collect::<Result<Vec<Wave>>>()?;
-    let brightest = waves.iter().flat_map(|wave| &wave.seen).fold(f32::MIN_POSITIVE, |most, &a| most.max(a));
-    let full = brightest * (spots.len() as f32).sqrt();
-    let stripes = Stripes::new(target, model);
+    let able = Able::new(target, model);
+    let full = able.full(&waves, lattice);
+    let aside = Aside::new(target, model);
     let columns: Vec<Between> =
         (0..grid.width).map(|i| Between::new(lattice.column(grid.x(i)), lattice.width)).collect();
     let mut phases = vec![0.0f32; grid.len()];
@@ -71,8 +71,8 @@ pub(super) fn converging(
             }
         }
         for (column, (phase, u)) in line.iter_mut().zip(&sum).enumerate() {
-            let aside = (u.norm() / full).min(1.0).acos();
-            *phase = (u.arg() + if stripes.is_above(column, row) { aside } else { -aside }).rem_euclid(TAU as f32);
+            let amplitude = (u.norm() / (full * able.amplitude(column, row))).min(1.0);
+            *phase = (u.arg() + aside.phase(amplitude, column, row)).rem_euclid(TAU as f32);
         }
     };
     phases.par_chunks_mut(grid.width).enumerate().for_each(line);
@@ -80,28 +80,72 @@ pub(super) fn converging(
     Ok(phases)
 }
 
-/// Which pixels have the greater one of the two phases that make an amplitude.
-struct Stripes {
-    /// Rows of a stripe; `None` for a checkerboard of pixels, which sends unwanted light the farthest.
-    rows: Option<usize>,
+/// How much of a picture's amplitude each pixel can show.
+struct Able<'a> {
+    model: &'a PanelModel,
+    /// What a wrap costs per radian that the eye's wave turns from pixel to pixel.
+    wraps: f32,
+    /// Places of the columns and rows from where the wave would stand still [rad/pixel].
+    turns: [Vec<f32>; 2],
 }
 
-impl Stripes {
-    /// Where neighbours blend, stripes as wide as the unwanted light still goes by the eye: it stands at ±λZ/(2·rows·pitch) above
-    /// and below, as wide as a pupil and the picture's own band. Beside each step of more than half a turn light is lost, and a
-    /// checkerboard of ±90° on a wave that wraps has one at every second pixel: on 1.6π with 0.3 pixels Cornell's room comes to
-    /// 32.3 dB from it and to 47.3 from stripes of five rows, where it is 48.9 without crosstalk (50 steps).
-    fn new(target: &ViewTarget, model: &PanelModel) -> Self {
-        let Pupil::Diameter(pupil) = target.viewer.pupil else { return Self { rows: None } };
-        let aside = 0.5 * target.wavelength * target.viewer.eye.z / model.grid.pitch_y;
-        let rows = (aside / (0.5 * target.viewer.eye_box.y + 1.15 * pupil)) as usize;
-        Self { rows: (model.blends() && rows > 1).then_some(rows) }
+impl<'a> Able<'a> {
+    fn new(target: &ViewTarget, model: &'a PanelModel) -> Self {
+        let (grid, eye) = (&model.grid, target.viewer.eye);
+        let slope = |pitch: f64, off: f64| (TAU * pitch * off / (target.wavelength * eye.z)).abs() as f32;
+        let across = (0..grid.width).map(|i| slope(grid.pitch_x, grid.x(i) - eye.x)).collect();
+        let down = (0..grid.height).map(|j| slope(grid.pitch_y, grid.y(j) - eye.y)).collect();
+        let wraps = if is_smooth(target, model) { WRAP * model.crosstalk() / TAU } else { 0.0 };
+        Self { model, wraps: wraps as f32, turns: [across, down] }
     }
 
-    fn is_above(&self, column: usize, row: usize) -> bool {
-        self.rows.map_or(column + row, |rows| row / rows).is_multiple_of(2)
+    /// The amplitude there, 1 for a pixel in full light without a wrap near.
+    fn amplitude(&self, column: usize, row: usize) -> f32 {
+        let beam = self.model.incident.as_ref().map_or(1.0, |wave| wave[row * self.model.grid.width + column].norm());
+        let kept = 1.0 - self.wraps * (self.turns[0][column] + self.turns[1][row]);
+        (beam * kept.max(0.5)).max(DARKEST)
+    }
+
+    /// The amplitude of the picture that takes all of a pixel's light: that of the brightest waves together. Where places can show
+    /// less, it is so much greater that hardly anything of the picture is cut. A picture of bars to the border, in a Gaussian
+    /// beam that has a quarter of its amplitude there, comes to 32.6 dB in 50 steps, and to 27.2 with the brightest waves'
+    /// amplitude.
+    fn full(&self, waves: &[Wave], lattice: &Grid) -> f32 {
+        let brightest = waves.iter().flat_map(|wave| &wave.seen).fold(f32::MIN_POSITIVE, |most, &a| most.max(a));
+        let full = brightest * (waves.len() as f32).sqrt();
+        let grid = &self.model.grid;
+        let near = |place: f64, count: usize| place.round().clamp(0.0, count as f64 - 1.0) as usize;
+        let places = (0..grid.height).step_by(SAMPLED);
+        let places = places.flat_map(|row| (0..grid.width).step_by(SAMPLED).map(move |column| (column, row)));
+        let lit = places.map(|(column, row)| {
+            let at = near(lattice.row(grid.y(row)), lattice.height) * lattice.width
+                + near(lattice.column(grid.x(column)), lattice.width);
+            (waves.iter().map(|wave| wave.seen[at].powi(2)).sum::<f32>().sqrt(), self.amplitude(column, row))
+        });
+        let lit: Vec<(f32, f32)> = lit.collect();
+        let all: f32 = lit.iter().map(|(wanted, _)| wanted * wanted).sum();
+        let cut = |full: f32| lit.iter().map(|(wanted, able)| (wanted - full * able).max(0.0).powi(2)).sum::<f32>();
+        if cut(full) <= CUT * all {
+            return full;
+        }
+        let (mut low, mut high) = (full, BRIGHTER * full);
+        for _ in 0..20 {
+            let middle = 0.5 * (low + high);
+            *if cut(middle) > CUT * all { &mut low } else { &mut high } = middle;
+        }
+        high
     }
 }
+
+/// Width of panel beside a wrap that shows nothing, per standard deviation of what neighbours blend by: ∫1 − cos(2πΦ(t))dt.
+const WRAP: f64 = 2.914;
+/// Amplitude below which a pixel shows nothing.
+const DARKEST: f32 = 1e-3;
+/// Share of a picture's light that may be cut, and the most that a picture is made darker to keep it.
+const CUT: f32 = 3e-3;
+const BRIGHTER: f32 = 8.0;
+/// Every so many rows and columns are looked at.
+const SAMPLED: usize = 8;
 
 /// A picture on a wave that converges on a spot: its phase is that of a column and a row, −π/λZ·((x − e_x)² + (y − e_y)²).
 struct Wave {

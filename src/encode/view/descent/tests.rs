@@ -73,7 +73,7 @@ impl<S: Sight> Slopes<'_, S> {
         // One step from empty moments leaves a tenth of the slopes in the first of them.
         let mut moved = frames(0.0, &start);
         let unit = loss(&moved).sqrt() / (0.1 * samples);
-        let settings = Descent { iterations: 1, rate: 0.1, looks: 3, seed: 1 };
+        let settings = Descent { iterations: 1, rate: 0.1, looks: 3, seed: 1, smooth: false };
         problem.step(&mut moved, &prepared, &settings, 0).expect("step");
         let slope = |frame: &Frame| frame.moments[0].iter().map(|m| f64::from(*m) * unit).collect();
         let slopes: Vec<Vec<f64>> = moved.iter().map(slope).collect();
