@@ -1,5 +1,6 @@
 //! Plates as a user meets them: the same bytes whoever computed which tile, independent readers, a real scheduler.
 
+mod pictures;
 mod sheet;
 
 use std::fs;

@@ -53,6 +53,10 @@ const QUICK_PAIR: f64 = 7e-9;
 /// Part of the error asked that the quick sum may err by.
 const QUICK_SHARE: f64 = 0.02;
 
+/// Part of the error asked that the far form may err by where it stands for the integral: points a few hundred pixels before a
+/// plate would take a thousand times longer.
+const FORM_SHARE: f64 = 0.02;
+
 /// The normal distribution's quantile that one measurement of a hundred passes.
 const CONFIDENCE: f64 = 2.326;
 
@@ -128,8 +132,8 @@ pub(super) fn measure(sum: &PointSum, field: &[Complex32], wanted: Wanted) -> Re
     if !found.is_finite() {
         return Ok(Measured::NOT_FINITE);
     }
-    let exact = Exact::new(sum);
     let Wanted { core_seconds, error, thorough } = wanted;
+    let exact = Exact::new(sum, FORM_SHARE * error);
     let is_quick = found > 0.0 && QUICK * (exact.power / found).sqrt() <= QUICK_SHARE * error;
     let pixel = exact.core_seconds(if is_quick { QUICK_PAIR } else { PAIR });
     let budget = (SHARE * core_seconds).max(LEAST) * if thorough { 8.0 } else { 1.0 };
@@ -245,9 +249,10 @@ struct Exact<'a> {
 }
 
 impl<'a> Exact<'a> {
-    fn new(sum: &PointSum<'a>) -> Self {
+    /// `form` is an error of the far form that does not matter.
+    fn new(sum: &PointSum<'a>, form: f64) -> Self {
         let PointSum { optics, grid, sources, cull, .. } = *sum;
-        let is_near = |s: &PointWave| Near::is_needed(optics, cull, s.distance);
+        let is_near = |s: &PointWave| Near::is_needed(optics, cull, s.distance, form);
         let (far, near): (Cow<[PointWave]>, Vec<PointWave>) = if sources.par_iter().any(is_near) {
             let (near, far) = sources.iter().partition(|s| is_near(s));
             (Cow::Owned(far), near)

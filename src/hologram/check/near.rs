@@ -13,7 +13,7 @@ use std::f64::consts::{PI, TAU};
 /// Error at which the expansion is cut.
 pub(super) const ACCURACY: f64 = 1e-7;
 
-/// Error of the far form up to which it stands for the integral.
+/// Error of the far form up to which it stands for the integral, whatever is asked.
 const FAR: f64 = 2e-5;
 
 /// Fresnel number of the taper's edge below which the far form is not used, whatever its error.
@@ -28,9 +28,9 @@ const TERM: f64 = 1e-8;
 pub(super) struct Near;
 
 impl Near {
-    /// Whether a point at this distance is integrated.
-    pub(super) fn is_needed(optics: &Optics, cull: Cull, distance: f64) -> bool {
-        let far = optics.far_error(distance) <= FAR && optics.edge_fresnel_number(distance) >= NEAREST_EDGE;
+    /// Whether a point at this distance is integrated where the far form may err by so much.
+    pub(super) fn is_needed(optics: &Optics, cull: Cull, distance: f64, error: f64) -> bool {
+        let far = optics.far_error(distance) <= FAR.max(error) && optics.edge_fresnel_number(distance) >= NEAREST_EDGE;
         cull == Cull::Soft && !far
     }
 

@@ -43,9 +43,9 @@ fn the_sum_at_pixels_is_the_oracle_s() {
             let pixels: Vec<usize> = (0..12).map(|i| i * 89 % grid.len()).collect();
             let places: Vec<_> = pixels.iter().map(|i| (i % grid.width, i / grid.width)).collect();
             let exact = oracle_at(&points, &grid, wavelength, cull, &places).expect("oracle");
-            let found = Exact::new(&sum).at(&sum, &pixels, false).expect("sum");
+            let found = Exact::new(&sum, 0.0).at(&sum, &pixels, false).expect("sum");
             let error = relative_error(&found, &exact);
-            let quickly = Exact::new(&sum).at(&sum, &pixels, true).expect("sum");
+            let quickly = Exact::new(&sum, 0.0).at(&sum, &pixels, true).expect("sum");
             let quick = relative_error(&quickly, &found);
             println!("{pitch:?} {z:?} {cull:?}: {error:.1e}, quickly {quick:.1e}");
             assert!(quick < QUICK, "{pitch:?} {z:?} {cull:?}: {quick:.1e}");
@@ -80,7 +80,7 @@ fn an_error_is_measured_wherever_it_is() {
     let (sources, progress) = (sources(&points).expect("sources"), Progress::new());
     let sum = PointSum { optics: &optics, grid: &grid, sources: &sources, cull: Cull::Soft, progress: &progress };
     let all: Vec<usize> = (0..grid.len()).collect();
-    let exact = Exact::new(&sum).at(&sum, &all, false).expect("field");
+    let exact = Exact::new(&sum, 0.0).at(&sum, &all, false).expect("field");
     let right: Vec<Complex32> = exact.iter().map(|u| Complex32::new(u.re as f32, u.im as f32)).collect();
     let found = measure(&sum, &right, WANTED).expect("measured");
     assert!(found.limit < 1e-5 && found.pixels == MOST, "{found:?}");

@@ -19,7 +19,7 @@ pub(in crate::hologram) const ERROR: f64 = 3e-5;
 
 /// Predicted work [core-seconds].
 pub(in crate::hologram) fn core_seconds(sum: &PointSum) -> f64 {
-    seconds(sum, &Exact::new(sum))
+    seconds(sum, &Exact::new(sum, 0.0))
 }
 
 /// The same, of points that were divided.
@@ -30,7 +30,7 @@ pub(super) fn seconds(sum: &PointSum, exact: &Exact) -> f64 {
 
 /// Memory that [`field`] takes [bytes].
 pub(in crate::hologram) fn memory(sum: &PointSum) -> u64 {
-    let exact = Exact::new(sum);
+    let exact = Exact::new(sum, 0.0);
     let lines = exact.near.iter().map(|s| Near::line_bytes(sum.optics, sum.grid, s));
     let (all, largest) =
         lines.fold((0usize, 0), |(all, largest), bytes| (all.saturating_add(bytes), largest.max(bytes)));
@@ -41,7 +41,7 @@ pub(in crate::hologram) fn memory(sum: &PointSum) -> u64 {
 /// The field on the whole grid.
 pub(in crate::hologram) fn field(sum: &PointSum) -> Result<Field> {
     let PointSum { optics, grid, progress, .. } = *sum;
-    let exact = Exact::new(sum);
+    let exact = Exact::new(sum, 0.0);
     progress.start("hologram: exact sum", (grid.height + exact.near.len()) as u64);
     let samples = samples(sum, &exact, LINES, || progress.advance(1))?;
     Ok(Field { grid: *grid, wavelength: optics.wavelength, samples }.to_f32())
