@@ -119,6 +119,7 @@ fn a_point_light_stands_behind_the_mirror_too() {
         direction: Vec3::NEG_Y,
         intensity: Vec3::splat(2.0),
         range: f32::INFINITY,
+        measured: None,
     }];
     let from = |x: f64, lamp: DVec3| {
         let way = lamp - DVec3::new(x, 0.0, 0.1);

@@ -222,6 +222,7 @@ mod tests {
             direction: Vec3::NEG_Y,
             intensity: Vec3::new(1.0, 0.5, 0.25),
             range: f32::INFINITY,
+            measured: None,
         });
         let settings = IlluminationSettings::default().coarse();
         Illumination::new(SceneBvh::new(room.scene), settings, &Progress::new()).expect("lit")

@@ -104,7 +104,10 @@ impl Image {
             LampSource::Point(light) => {
                 let mut light = light.clone();
                 light.position = mirror.image(light.position.as_dvec3()).as_vec3();
-                light.direction = reflected(light.direction.as_dvec3(), mirror.normal).as_vec3();
+                let axes = light.measured.iter_mut().flat_map(|measured| &mut measured.axes);
+                for axis in axes.chain([&mut light.direction]) {
+                    *axis = reflected(axis.as_dvec3(), mirror.normal).as_vec3();
+                }
                 LampSource::Point(light)
             }
         };

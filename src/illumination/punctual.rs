@@ -33,7 +33,10 @@ pub(crate) fn punctual_light(size: f64, light: &PunctualLight, at: ShadingPoint)
             let edge = ((cosine - outer) / (inner - outer).max(1e-3)).clamp(0.0, 1.0);
             strength * edge * edge
         }
-        _ => strength,
+        _ => match &light.measured {
+            Some(measured) => strength * measured.towards(-towards),
+            None => strength,
+        },
     };
     let cosine = normal.dot(towards);
     if !(cosine > 0.0 && strength > 0.0 && strength.is_finite()) {

@@ -215,6 +215,7 @@ mod tests {
             direction: Vec3::NEG_Y,
             intensity: Vec3::splat(std::f32::consts::PI),
             range: f32::INFINITY,
+            measured: None,
         });
         let bvh = SceneBvh::new(room.scene);
         let settings =
@@ -246,6 +247,7 @@ mod tests {
             direction: Vec3::new(0.5, -0.9, -0.3).normalize(),
             intensity: Vec3::splat(20.0),
             range: f32::INFINITY,
+            measured: None,
         });
         let bvh = SceneBvh::new(room.scene);
         let light = Illumination::new(bvh, IlluminationSettings::default(), &Progress::new()).expect("light");

@@ -186,6 +186,7 @@ fn punctual_lights_follow_their_laws() {
         direction: Vec3::NEG_Y,
         intensity: Vec3::splat(intensity),
         range: f32::INFINITY,
+        measured: None,
     };
     let floor_at = |scene: &Scene, x: f64| {
         let light = lit(scene, IlluminationSettings::default());
@@ -200,6 +201,23 @@ fn punctual_lights_follow_their_laws() {
     let r2 = 0.2 * 0.2 + 0.01 + 4.0;
     close(floor_at(&room.scene, 0.2), [8.0 / r2 * (2.0 / f64::sqrt(r2)) / PI; 3], 1e-4);
     assert_eq!(floor_at(&room.scene, 1.5), Vec3::ZERO);
+    // A measured lamp, whose aim is down: 8 along it, falling to 2 at 45°; and in a mirror beside it its image, turned over.
+    let web = b"TILT=NONE\n1 1 1 2 2 1 2 0 0 0 1 1 1\n0 45\n0 180\n8 2\n8 6\n";
+    let photometry = std::sync::Arc::new(crate::scene::Photometry::read(web).expect("photometry"));
+    let measured = crate::scene::Measured { photometry, axes: [Vec3::X, Vec3::NEG_Z, Vec3::Y] };
+    room.scene.lights = vec![PunctualLight { measured: Some(measured), ..lamp(LightKind::Point, 1.0) }];
+    let expected = |x: f64, z: f64| {
+        let (r2, polar) = (x * x + z * z + 4.0, x.hypot(z).atan2(2.0) / (0.25 * PI));
+        let azimuth = (-z).atan2(x).abs() / PI;
+        (8.0 - polar * (6.0 - 4.0 * azimuth)) / r2 * (2.0 / f64::sqrt(r2)) / PI
+    };
+    for x in [0.3, 1.0, -1.0] {
+        close(floor_at(&room.scene, x), [expected(x, 0.1); 3], 1e-4);
+    }
+    let mirror = room.material(Material::mirror(Vec3::ONE));
+    room.quad(DVec3::new(-0.5, 0.0, -4.0), DVec3::Y * 4.0, DVec3::Z * 8.0, mirror);
+    // A ray by way of the mirror at x = −0.5 is one of a lamp at x = −1 whose x is turned over.
+    close(floor_at(&room.scene, 0.2), [expected(0.2, 0.1) + expected(-1.2, 0.1); 3], 2e-3);
 }
 
 #[test]
@@ -282,6 +300,7 @@ fn a_closed_body_of_many_triangles_is_lit_on_the_side_where_there_is_light() {
             direction: Vec3::NEG_Z,
             intensity: Vec3::splat(intensity as f32),
             range: f32::INFINITY,
+            measured: None,
         });
         room.scene
     };
@@ -325,6 +344,7 @@ fn a_spot_of_sun_lights_what_is_above_it() {
         direction: Vec3::NEG_Y,
         intensity: Vec3::splat(PI as f32),
         range: f32::INFINITY,
+        measured: None,
     });
     let light = lit(&room.scene, IlluminationSettings::default());
     let (mut mean, mut square_error, n) = (0.0, 0.0, 200);

@@ -191,6 +191,7 @@ fn rough_metal_shows_all_of_its_lobe_and_the_glint_of_a_light_without_size() {
             direction: -towards.as_vec3(),
             intensity: Vec3::splat(2.0),
             range: f32::INFINITY,
+            measured: None,
         });
         let (found, glint) = (seen(&room.scene), 2.0 * microfacets(view, towards, alpha, f0));
         assert!((found / glint - 1.0).abs() < 1e-3, "roughness {roughness}: {found}, not {glint}");

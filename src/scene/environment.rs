@@ -96,6 +96,7 @@ impl Environment {
             direction: (-turned(direction, turn)).as_vec3(),
             intensity,
             range: f32::INFINITY,
+            measured: None,
         };
         let found = found.into_iter().map(|(towards, light)| sun(LightKind::Directional, towards, light));
         let known = disc.map(|d| sun(LightKind::Sun { radius: d.radius as f32 }, d.towards, d.irradiance));

@@ -10,12 +10,14 @@ pub mod camera;
 pub mod environment;
 pub mod gltf;
 pub mod material;
+pub mod photometry;
 pub mod texture;
 
 pub use bvh::{Hit, Ray, SceneBvh, Sides};
 pub use camera::{Camera, Projection};
 pub use environment::Environment;
 pub use material::{AlphaMode, Material, TextureRef};
+pub use photometry::{Measured, Photometry};
 pub use texture::Texture;
 
 use glam::{DVec3, Vec2, Vec3};
@@ -76,6 +78,8 @@ pub struct PunctualLight {
     pub intensity: Vec3,
     /// Distance at which it ends [m]; infinite where the file sets none.
     pub range: f32,
+    /// What a lamp's maker measured of a point light: its intensity is this times `intensity`.
+    pub measured: Option<Measured>,
 }
 
 /// Shape of a punctual light.

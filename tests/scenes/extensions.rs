@@ -144,6 +144,37 @@ fn light_is_added_where_a_glowing_detail_lights_nothing_and_nowhere_else() {
 }
 
 #[test]
+fn a_lamp_shines_as_its_makers_file_says() {
+    let mut file = matt();
+    let profile = b"IESNA:LM-63-2002\r\nTILT=NONE\r\n1 1000 1 3 1 1 2 0 0 0 1 1 60\r\n0 45 90\r\n0\r\n100 50 10\r\n";
+    let view = file.view(profile);
+    file.json["extensionsUsed"] = json!(["EXT_lights_ies"]);
+    file.json["extensions"] = json!({"EXT_lights_ies": {"lights": [
+        {"uri": "lamp.ies"}, {"bufferView": view, "mimeType": "application/x-ies-lm-63"}]}});
+    // Turned by a quarter about +x it aims at −y instead of −z.
+    let turn = [-std::f32::consts::FRAC_1_SQRT_2, 0.0, 0.0, std::f32::consts::FRAC_1_SQRT_2];
+    let ies = json!({"EXT_lights_ies": {"light": 1, "multiplier": 0.5, "color": [1, 0.5, 0]}});
+    let node = file.node(json!({"translation": [0, 3, 0], "rotation": turn, "extensions": ies}));
+    let loaded = file.load().expect("loads");
+    assert!(!warns(&loaded, "no light"), "{:?}", loaded.warnings);
+    let [lamp] = &loaded.scene.lights[..] else { panic!("{:?}", loaded.scene.lights) };
+    assert_eq!((lamp.position, lamp.intensity), (Vec3::new(0.0, 3.0, 0.0), Vec3::new(0.5, 0.25, 0.0)));
+    let measured = lamp.measured.as_ref().expect("measured");
+    for (direction, candela) in [(glam::DVec3::NEG_Y, 100.0), (glam::DVec3::X, 10.0), (glam::DVec3::Y, 0.0)] {
+        assert!((measured.towards(direction) - candela).abs() < 1e-2, "{direction}");
+    }
+    for (light, word) in [
+        (json!({"light": 0}), "lamp.ies"),
+        (json!({"light": 2}), "there are 2"),
+        (json!({"light": 1, "multiplier": -1}), "below zero"),
+        (json!({"multiplier": 1}), "light"),
+    ] {
+        file.json["nodes"][node]["extensions"] = json!({"EXT_lights_ies": light});
+        assert_refused(file.load(), word);
+    }
+}
+
+#[test]
 fn an_environment_of_the_file_lights_from_where_its_cube_says() {
     let mut file = matt();
     let face = |file: &mut Builder, rgba: [u8; 4]| {

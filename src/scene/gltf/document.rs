@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 /// KHR_lights_punctual and KHR_materials_emissive_strength speak of candela, lux and nit; their numbers are taken as
 /// W/sr, W/m² and W/(m² sr), which keeps all ratios.
 pub const UNDERSTOOD_EXTENSIONS: &[&str] = &[
+    "EXT_lights_ies",
     "EXT_lights_image_based",
     "EXT_mesh_gpu_instancing",
     #[cfg(feature = "meshopt")]

@@ -57,6 +57,7 @@ pub(super) fn read(document: &Document, nodes: &Nodes) -> Result<Vec<PunctualLig
             direction: (-pose.z_axis.truncate()).as_vec3(),
             intensity,
             range,
+            measured: None,
         });
     }
     Ok(lights)
@@ -186,6 +187,7 @@ fn viewer_light(scene: &mut Scene, framed: Option<(DVec3, DVec3)>) {
         direction: (-from).as_vec3(),
         intensity: Vec3::splat(KEY_IRRADIANCE),
         range: f32::INFINITY,
+        measured: None,
     });
     scene.lights.push(PunctualLight {
         kind: LightKind::Eye,
@@ -193,5 +195,6 @@ fn viewer_light(scene: &mut Scene, framed: Option<(DVec3, DVec3)>) {
         direction: camera.world_from_camera.transform_vector3(DVec3::NEG_Z).as_vec3(),
         intensity: Vec3::splat(FILL_IRRADIANCE * distance * distance),
         range: f32::INFINITY,
+        measured: None,
     });
 }

@@ -44,6 +44,7 @@ mod instances;
 mod ktx2;
 mod lights;
 mod materials;
+mod measured_lights;
 mod meshes;
 mod nodes;
 mod own_light;
@@ -62,7 +63,7 @@ pub use resources::MAX_FILE_BYTES;
 pub use vertices::{Vertices, has_only_points, read_vertices};
 
 use super::environment::{Panorama, Sky};
-use super::{Environment, Material, Scene, Texture, Warning};
+use super::{Environment, Material, Photometry, Scene, Texture, Warning};
 use crate::error::{Error, Result};
 use document::Document;
 use glam::DVec3;
@@ -158,6 +159,8 @@ pub struct File {
     decoded: Option<Decoded>,
     /// What was found out of its light, once it was looked at.
     light: lights::Known,
+    /// Photometric files that were read.
+    lamps: Vec<Option<Arc<Photometry>>>,
     /// The panorama that was read last.
     around: Option<(Panorama, Arc<Environment>)>,
     /// The file's own environment, once it was looked for, and the scene that names it.
@@ -190,7 +193,15 @@ impl File {
     pub fn open_with(path: &Path, options: &LoadOptions) -> Result<Self> {
         let mut warnings = Vec::new();
         let document = Document::open(path, options.allow_outside, &mut warnings)?;
-        Ok(Self { document, warnings, decoded: None, light: lights::Known::default(), around: None, own_around: None })
+        Ok(Self {
+            document,
+            warnings,
+            decoded: None,
+            light: lights::Known::default(),
+            lamps: Vec::new(),
+            around: None,
+            own_around: None,
+        })
     }
 
     /// A glTF or GLB file from its bytes, which hold all that it needs: buffers and images in the binary chunk or in data URIs.
@@ -203,7 +214,15 @@ impl File {
         let mut warnings = Vec::new();
         let source = resources::Source { scene: name, allow_outside: false, is_alone: true };
         let document = Document::of_bytes(source, bytes, true, &mut warnings)?;
-        Ok(Self { document, warnings, decoded: None, light: lights::Known::default(), around: None, own_around: None })
+        Ok(Self {
+            document,
+            warnings,
+            decoded: None,
+            light: lights::Known::default(),
+            lamps: Vec::new(),
+            around: None,
+            own_around: None,
+        })
     }
 
     /// The scene in the pose that `options` name.
@@ -233,7 +252,8 @@ impl File {
         let (materials, textures) = (decoded.materials.clone(), decoded.textures.clone());
         let framed = options.framed.map(|(low, high)| corners_of_box(low, high));
         let cameras = cameras::read(document, &nodes, options.camera.as_ref(), &triangles, framed, &mut warnings)?;
-        let lights = lights::read(document, &nodes)?;
+        let mut lights = lights::read(document, &nodes)?;
+        lights.extend(measured_lights::read(document, &nodes, &mut self.lamps)?);
 
         let environment = match around(&mut self.around, options, &mut warnings)? {
             Some(around) => Some(around),
