@@ -9,6 +9,8 @@
 mod binary;
 mod child;
 mod desk;
+#[cfg(unix)]
+mod experiment;
 mod frames;
 mod live;
 mod monitors;
@@ -58,6 +60,8 @@ fn main() -> ExitCode {
         serving::CASES,
         #[cfg(unix)]
         python::CASES,
+        #[cfg(unix)]
+        experiment::CASES,
         window_manager::CASES,
         #[cfg(unix)]
         wayland::CASES,

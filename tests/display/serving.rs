@@ -30,6 +30,8 @@ pub(crate) struct Served {
     folder: tempfile::TempDir,
     pub(crate) slmsuite: u16,
     slmpy: u16,
+    /// Where triggers are heard, if they are.
+    pub(crate) trigger: Option<u16>,
 }
 
 impl Served {
@@ -52,12 +54,13 @@ impl Served {
         let mut line = String::new();
         said.read_line(&mut line).expect("first line");
         let told: serde_json::Value = serde_json::from_str(&line).expect("first line");
-        let port = |name: &str| {
-            let address = told["serving"][name].as_str().expect("address");
-            address.strip_prefix("127.0.0.1:").expect("loopback").parse().expect("port")
+        let heard = |name: &str| -> Option<u16> {
+            let address = told["serving"][name].as_str()?;
+            Some(address.strip_prefix("127.0.0.1:").expect("loopback").parse().expect("port"))
         };
+        let port = |name: &str| heard(name).expect("address");
         assert_eq!(told["serving"]["on"], monitor, "{told}");
-        Self { slmsuite: port("slmsuite"), slmpy: port("slmpy"), process, said, folder }
+        Self { slmsuite: port("slmsuite"), slmpy: port("slmpy"), trigger: heard("trigger"), process, said, folder }
     }
 
     pub(crate) fn socket(&self) -> PathBuf {
