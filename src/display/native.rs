@@ -117,6 +117,8 @@ impl NativeWindow {
 
 fn x11_id(window: &Window) -> Option<u32> {
     match window.window_handle().ok()?.as_raw() {
+        // Its type has the width of C's long; Windows, where that is another one, has no X.
+        #[cfg(not(windows))]
         RawWindowHandle::Xlib(handle) => u32::try_from(handle.window).ok(),
         RawWindowHandle::Xcb(handle) => Some(handle.window.get()),
         _ => None,

@@ -135,7 +135,7 @@ pub(crate) struct RandomArgs {
 #[command(next_help_heading = "Scene")]
 pub(crate) struct QualityArgs {
     /// How good the light is: rays, patches and photons by one word.
-    #[arg(long, value_parser = one_of::<Quality>(), default_value = "normal", value_name = "NAME")]
+    #[arg(hide_short_help = true, long, value_parser = one_of::<Quality>(), default_value = "normal", value_name = "NAME")]
     pub(crate) quality: Quality,
     /// The same by the error that the picture's light may have: 0.2% to 20%, for example 0.5%.
     ///
