@@ -53,5 +53,5 @@ fn main() {
     fit.write(&profile, &path).expect("written");
     let calibrated = PanelProfile::read(&path).expect("read");
     let [perfect, before, after] = eye::seen(&bench, &profile, &calibrated, errors.tilt, 50);
-    println!("seen by an eye: perfect panel {perfect:.1} dB, bench before {before:.1} dB, after {after:.1} dB");
+    println!("seen by an eye: perfect panel {perfect:.2} dB, bench before {before:.2} dB, after {after:.2} dB");
 }
