@@ -82,9 +82,11 @@ impl Photometry {
             return Err("its vertical angles do not rise within 0 to 180 degrees".into());
         }
         let last = horizontal[around - 1];
-        let begins = if (horizontal[0], last) == (90.0, 270.0) { 90.0 } else { 0.0 };
-        let ends = around == 1 || [90.0, 180.0, 270.0, 360.0].contains(&last) || (180.0 < last && last < 360.0);
-        if !(rises(&horizontal) && horizontal[0] == begins && ends) && around > 1 {
+        let is_whole = match (horizontal[0], last) {
+            (0.0, 90.0) | (90.0, 270.0) => true,
+            (first, last) => first == 0.0 && (180.0..=360.0).contains(&last),
+        };
+        if around > 1 && !(rises(&horizontal) && is_whole) {
             return Err(format!(
                 "its horizontal angles run from {} to {last} degrees; they must rise from 0 to 90, 180 or 360, or from 90 to 270",
                 horizontal[0]

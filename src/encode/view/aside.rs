@@ -40,9 +40,6 @@ impl Aside {
         let top = (0..2 * rows).map(|row| angle(row).cos()).fold(0.0, f64::max);
         let shape: Vec<f32> = (0..2 * rows).map(|row| (angle(row).cos() / top) as f32).collect();
         let amplitude = |d: f32| -> f32 {
-            if blend == 0.0 {
-                return shape.iter().map(|c| (d * c).cos()).sum::<f32>() / shape.len() as f32;
-            }
             // The middle one of three periods.
             let phases: Vec<f32> = (0..6 * rows).map(|row| d * shape[row % (2 * rows)]).collect();
             let light = mixed(&phases, 1, blend, |phase| phasor(phase / TAU));
@@ -109,11 +106,7 @@ mod tests {
             for wanted in [0.0f32, 0.013, 0.1, 0.35, 0.5, 0.8, 0.97, 1.0] {
                 let phases: Vec<f32> = (0..width * height).map(|i| aside.phase(wanted, i % width, i / width)).collect();
                 let turned = |phase: f32| phasor(phase / TAU);
-                let light = if blend > 0.0 {
-                    mixed(&phases, width, blend, turned)
-                } else {
-                    phases.iter().map(|&phase| turned(phase)).collect()
-                };
+                let light = mixed(&phases, width, blend, turned);
                 // Whole periods, away from the border.
                 let inner = &light[width * height / 3..][..width * height / 3];
                 let mean = inner.iter().sum::<Complex32>() / inner.len() as f32;

@@ -193,15 +193,7 @@ impl File {
     pub fn open_with(path: &Path, options: &LoadOptions) -> Result<Self> {
         let mut warnings = Vec::new();
         let document = Document::open(path, options.allow_outside, &mut warnings)?;
-        Ok(Self {
-            document,
-            warnings,
-            decoded: None,
-            light: lights::Known::default(),
-            lamps: Vec::new(),
-            around: None,
-            own_around: None,
-        })
+        Ok(Self::of(document, warnings))
     }
 
     /// A glTF or GLB file from its bytes, which hold all that it needs: buffers and images in the binary chunk or in data URIs.
@@ -214,7 +206,12 @@ impl File {
         let mut warnings = Vec::new();
         let source = resources::Source { scene: name, allow_outside: false, is_alone: true };
         let document = Document::of_bytes(source, bytes, true, &mut warnings)?;
-        Ok(Self {
+        Ok(Self::of(document, warnings))
+    }
+
+    /// A file of which nothing was looked at.
+    fn of(document: Document, warnings: Vec<Warning>) -> Self {
+        Self {
             document,
             warnings,
             decoded: None,
@@ -222,7 +219,7 @@ impl File {
             lamps: Vec::new(),
             around: None,
             own_around: None,
-        })
+        }
     }
 
     /// The scene in the pose that `options` name.
