@@ -54,7 +54,7 @@ pub(super) fn show(args: &ShowArgs, path: &Path, mut report: Report) -> Result<R
     let rate = args.sequence.fps.unwrap_or(USUAL_RATE);
     let animation = Animation::new(path, &settings, rate, args.sequence.from, args.sequence.to)?;
     #[cfg(feature = "display")]
-    let screen = super::screen::Screen::asked(args)?;
+    let screen = super::screen::Screen::asked(args, &setup)?;
     files::output_folder(&args.output.join("frames"))?;
     let bar = Bar::new();
     let mut maker = Maker { animation, setup };

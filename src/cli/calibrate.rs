@@ -31,12 +31,13 @@ pub(super) fn calibrate(command: &CalibrateCommand) -> Result<Report> {
 
 fn sweep(args: &CurveArgs) -> Result<Report> {
     let mut report = Report::new("calibrate curve");
-    let Setup { profile, wavelength, .. } = phase_panel(&args.panel, &mut report)?;
+    let setup = phase_panel(&args.panel, &mut report)?;
+    let Setup { profile, wavelength, .. } = &setup;
     let settings = Sweep { levels: args.levels, stripe: args.stripe, regions: args.regions, order: args.order };
-    let series = settings.frames(&profile, wavelength)?;
+    let series = settings.frames(profile, *wavelength)?;
     let folder = args.output.as_deref().unwrap_or(Path::new("sweep"));
-    give_out(&series, folder, &args.shown, &profile, &mut report)?;
-    let angle = settings.order_angle(&profile, wavelength);
+    give_out(&series, folder, &args.shown, (&args.panel, &setup), &mut report)?;
+    let angle = settings.order_angle(profile, *wavelength);
     report.add(
         "order_angle",
         angle,
@@ -45,7 +46,7 @@ fn sweep(args: &CurveArgs) -> Result<Report> {
              calibrate curve --panel {} --wavelength {} --powers {}",
             angle.to_degrees(),
             args.panel.panel,
-            show_length(wavelength),
+            show_length(*wavelength),
             folder.join("manifest.csv").display()
         ),
     );
@@ -88,13 +89,13 @@ fn curve(args: &CurveArgs, powers: &Path) -> Result<Report> {
 
 fn steps(args: &FlatnessArgs) -> Result<Report> {
     let mut report = Report::new("calibrate flatness");
-    let Setup { profile, wavelength, .. } = phase_panel(&args.panel, &mut report)?;
+    let setup = phase_panel(&args.panel, &mut report)?;
     if args.into.is_some() {
         return Err(Error::parameter("into", "the correction is not known before --interferograms or --zernike"));
     }
-    let series = step_frames(&profile, wavelength, args.steps)?;
+    let series = step_frames(&setup.profile, setup.wavelength, args.steps)?;
     let folder = args.output.as_deref().unwrap_or(Path::new("steps"));
-    give_out(&series, folder, &args.shown, &profile, &mut report)?;
+    give_out(&series, folder, &args.shown, (&args.panel, &setup), &mut report)?;
     report.line(
         "superpose the panel's light with a flat wave, picture its pixels one to one in each step, then: holodrive calibrate \
          flatness --interferograms …",
@@ -134,7 +135,7 @@ fn check(args: &CheckArgs) -> Result<Report> {
     let panel = phase_panel(&args.panel, &mut report)?;
     let correction = told_correction(&panel, &mut report)?;
     let made = cards(&panel.profile, panel.wavelength, correction.as_ref(), args.distance, &Progress::new())?;
-    give_out(&card_frames(&made), &args.output, &args.shown, &panel.profile, &mut report)?;
+    give_out(&card_frames(&made), &args.output, &args.shown, (&args.panel, &panel), &mut report)?;
     for card in &made {
         report.add(card.name, card.look_for.clone(), format!("{}: {}", card.name, card.look_for));
     }

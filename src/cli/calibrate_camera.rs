@@ -27,7 +27,7 @@ pub(super) fn camera(args: &CameraArgs) -> Result<Report> {
             return Err(Error::parameter("lens, camera-pitch", what));
         }
         let folder = args.output.as_deref().unwrap_or(Path::new("patterns"));
-        give_out(&series, folder, &args.shown, profile, &mut report)?;
+        give_out(&series, folder, &args.shown, (&args.panel, &setup), &mut report)?;
         report.line(
             "take a photo of each in the focal plane of a lens behind the panel, name it as its frame, then: holodrive calibrate \
              camera --photos … --lens … --camera-pitch …",

@@ -27,14 +27,21 @@ impl<'a> CameraCommand<'a> {
             let _ = std::fs::remove_file(photo.with_file_name(format!("{name}.{old}")));
         }
         let line = self.command.replace("{frame}", &quoted(frame)).replace("{photo}", &quoted(photo));
-        let mut shell = if cfg!(windows) { Command::new("cmd") } else { Command::new("sh") };
-        let status = shell.arg(if cfg!(windows) { "/C" } else { "-c" }).arg(&line).stdout(Stdio::null()).status();
+        let status = shell(&line).stdout(Stdio::null()).status();
         let status = status.map_err(Error::io("camera-command"))?;
         if !status.success() {
             return Err(Error::parameter("camera-command", format!("`{line}` ended with {status}")));
         }
         Ok(())
     }
+}
+
+/// A line of the user's, for the system's shell.
+pub(super) fn shell(line: &str) -> Command {
+    let (name, option) = if cfg!(windows) { ("cmd", "/C") } else { ("sh", "-c") };
+    let mut command = Command::new(name);
+    command.args([option, line]);
+    command
 }
 
 /// A path as one word of a shell's line.

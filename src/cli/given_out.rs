@@ -15,16 +15,16 @@ pub(super) fn give_out(
     series: &FrameSeries,
     folder: &Path,
     shown: &ShownArgs,
-    profile: &PanelProfile,
+    (args, setup): (&PanelArgs, &Setup),
     report: &mut Report,
 ) -> Result<()> {
-    let hold = duration(shown, profile)?;
+    let hold = duration(shown, &setup.profile)?;
     #[cfg(not(feature = "display"))]
     if shown.monitor.is_some() {
         return Err(Error::unsupported("this build has no display; build it with the feature `display` (the default)"));
     }
     #[cfg(feature = "display")]
-    let screen = shown.monitor.as_deref().map(super::screen::Screen::named).transpose()?;
+    let screen = shown.monitor.as_deref().map(|name| super::screen::Screen::named(name, args, setup)).transpose()?;
     let bar = Bar::new();
     series.write(folder, &bar.progress)?;
     report.value("frames", series.count());
@@ -36,7 +36,7 @@ pub(super) fn give_out(
         screen.play(series.frames(), hold, &bar.progress, report)?;
     }
     #[cfg(not(feature = "display"))]
-    let _ = hold;
+    let _ = (hold, args);
     Ok(())
 }
 

@@ -4,6 +4,7 @@ use super::args::ShowArgs;
 use super::bar::Bar;
 use super::controls::{Changed, Choices, Controls, KEYS, TURN_STEP};
 use super::load::{self, Input};
+use super::panel_command::Ready;
 use super::report::{Report, count, seconds};
 use super::resolve;
 use super::screen::show_settings;
@@ -87,6 +88,7 @@ pub(super) fn show(args: &ShowArgs, mut report: Report) -> Result<Report> {
     if home.is_none() && place == OperatorChoice::Auto {
         report.warn(["there is no monitor beside the panel's: no operator's view"]);
     }
+    let _ready = Ready::make(&args.panel, &setup)?;
     // The panel is taken with all levels at zero, before anything is computed.
     let idle = Frame::new(&setup.profile, setup.wavelength, vec![0; setup.grid.len()])?;
     settings.window.take_keyboard = home.is_none();

@@ -24,6 +24,8 @@ mod load;
 mod manual;
 mod monitors;
 mod output;
+#[cfg(feature = "display")]
+mod panel_command;
 mod panels;
 mod pictures;
 mod plate_source;

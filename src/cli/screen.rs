@@ -1,11 +1,12 @@
 //! Frames on a real monitor.
 
-use super::args::{Ahead, ShowArgs};
+use super::args::{Ahead, PanelArgs, ShowArgs};
+use super::panel_command::Ready;
 use super::report::{Report, count, seconds};
 use crate::display::{
     self, Display, DisplayFrame, FrameTime, PlayReport, PlaySettings, Presenter, ShowSettings, WindowSettings,
 };
-use crate::panel::Frame;
+use crate::panel::{Frame, Setup};
 use crate::progress::Progress;
 use crate::{Error, Result};
 use std::collections::VecDeque;
@@ -24,29 +25,31 @@ pub(super) struct Screen {
     ahead: usize,
     /// Where each frame's times are written.
     events: Option<PathBuf>,
+    /// The panel's second channel; put back when the frames have been shown.
+    _ready: Ready,
 }
 
 impl Screen {
     /// The monitor that the flags name, if they name one.
-    pub(super) fn asked(args: &ShowArgs) -> Result<Option<Self>> {
+    pub(super) fn asked(args: &ShowArgs, setup: &Setup) -> Result<Option<Self>> {
         let Some(settings) = show_settings(args)? else { return Ok(None) };
         let ahead = match args.sequence.ahead {
             Ahead::Frames(count) => count,
             // They are made before the first is shown.
             Ahead::All => 1,
         };
-        Ok(Some(Self { ahead, events: args.sequence.events.clone(), ..Self::find(settings)? }))
+        Ok(Some(Self { ahead, events: args.sequence.events.clone(), ..Self::find(settings, &args.panel, setup)? }))
     }
 
     /// The monitor of that name, for frames with exact levels.
-    pub(super) fn named(name: &str) -> Result<Self> {
-        Self::find(ShowSettings::new(name.parse()?))
+    pub(super) fn named(name: &str, panel: &PanelArgs, setup: &Setup) -> Result<Self> {
+        Self::find(ShowSettings::new(name.parse()?), panel, setup)
     }
 
-    fn find(settings: ShowSettings) -> Result<Self> {
+    fn find(settings: ShowSettings, panel: &PanelArgs, setup: &Setup) -> Result<Self> {
         let mut display = Display::connect()?;
         settings.monitor.find(&display.monitors()?)?;
-        Ok(Self { display, settings, ahead: 2, events: None })
+        Ok(Self { display, settings, ahead: 2, events: None, _ready: Ready::make(panel, setup)? })
     }
 
     /// How frames in time are played here: at the monitor's own rate, on a panel that settles at once. They end with the last

@@ -130,7 +130,7 @@ pub(super) fn prepared(args: &ShowArgs, source: &Source, mut report: Report) -> 
     let frames = opener.open()?;
     let notes = frames.notes();
     #[cfg(feature = "display")]
-    if let Some(screen) = super::screen::Screen::asked(args)? {
+    if let Some(screen) = super::screen::Screen::asked(args, &setup)? {
         files::output_folder(&args.output)?;
         let again = args.sequence.repeat.then(|| opener.clone());
         let played = Repeated { frames, again, shown: false };

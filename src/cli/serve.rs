@@ -76,6 +76,7 @@ fn on_monitor(
     };
     let mut display = Display::connect()?;
     settings.monitor.find(&display.monitors()?)?;
+    let _ready = super::panel_command::Ready::make(&args.panel, &service.setup)?;
     // A port that is taken is found out before the panel shows anything.
     let server = service.start()?;
     let idle = std::sync::Arc::new(DisplayFrame::packed(&[&service.idle])?);
@@ -98,6 +99,8 @@ fn on_monitor(_: &ServeArgs, _: &str, _: &Service, _: &Progress, _: &mut Report)
 /// What is served and how, as the flags say.
 struct Service {
     driver: Driver,
+    #[cfg_attr(not(feature = "display"), allow(dead_code))]
+    setup: Setup,
     panel: ServedPanel,
     settings: ServeSettings,
     idle: Frame,
@@ -120,6 +123,7 @@ impl Service {
         let settings = settings(args, &served, report)?;
         Ok(Self {
             driver,
+            setup: panel,
             panel: served,
             settings,
             idle,

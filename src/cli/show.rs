@@ -59,7 +59,7 @@ fn run(args: &ShowArgs) -> Result<Report> {
     check(args, &source, &setup, &settings)?;
     // A monitor that is not there is found out before the work, not after it.
     #[cfg(feature = "display")]
-    let screen = super::screen::Screen::asked(args)?;
+    let screen = super::screen::Screen::asked(args, &setup)?;
     // A frame that is on its way to a monitor needs no folder.
     let is_named = args.output.as_os_str() != DEFAULT_OUTPUT;
     let writes = args.monitor.is_none() || is_named || !matches!(source, Input::Frame(_));

@@ -51,6 +51,19 @@ impl Field<f32> {
         }
         Ok(Self { grid, wavelength, samples })
     }
+
+    /// The wave exp(iφ) of these phases [rad]; refused when their number is not the grid's.
+    ///
+    /// ```
+    /// use holodrive::field::{Field, Grid};
+    /// let flat = Field::of_phases(Grid::new(2, 2, 8e-6, 8e-6)?, 532e-9, &[0.0; 4])?;
+    /// assert_eq!(flat.energy(), 4.0);
+    /// # Ok::<(), holodrive::Error>(())
+    /// ```
+    pub fn of_phases(grid: Grid, wavelength: f64, phases: &[f32]) -> Result<Self> {
+        Self::new(grid, wavelength, phases.par_iter().copied().map(Complex32::cis).collect())
+    }
+
     /// Σ|u|², without the pixel's area: what a unitary step keeps.
     pub fn energy(&self) -> f64 {
         // Row by row, so that the sum is the same for any number of threads.

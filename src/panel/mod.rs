@@ -52,7 +52,7 @@ pub use fidelity::{Fidelity, drive_measured};
 pub use frame::{Applied, EncodingRecord, Frame, FrameMetadata, Illumination, Origin};
 pub use nearest_table::NearestTable;
 pub use packing::VideoFrame;
-pub use profile::{CorrectionFile, PanelKind, PanelProfile};
+pub use profile::{CorrectionFile, PanelCommands, PanelKind, PanelProfile};
 pub use regional::PixelCurve;
 pub use response::{Curve, PhaseSign, Response};
 pub use setup::{Correction, Setup};

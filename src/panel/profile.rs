@@ -43,6 +43,25 @@ pub struct CorrectionFile {
     pub wavelength: Option<f64>,
 }
 
+/// What makes a panel ready beside its video signal, and what puts it back: lines for the system's shell (a vendor's program that
+/// sets gain and gamma over USB, or `stty` and `printf` for a serial line).
+///
+/// ```toml
+/// [command]
+/// before = "slmctl --usb --gain 1.8 --wavelength {wavelength}"
+/// after = "slmctl --usb --standby"
+/// ```
+///
+/// Nothing here runs them: a profile may come from anyone, so that whoever runs the program has to allow it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PanelCommands {
+    /// Run before the first frame is shown; `{wavelength}` stands for the vacuum wavelength in nm, `{name}` for the panel's name.
+    pub before: Option<String>,
+    /// Run after the last one.
+    pub after: Option<String>,
+}
+
 /// A panel's profile: read from `calib/*.toml` or from the user's file, all lengths in metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
@@ -96,6 +115,9 @@ pub struct PanelProfile {
     /// Files of wavefront corrections.
     #[serde(default)]
     pub corrections: Vec<CorrectionFile>,
+    /// What the panel's second channel is sent, where it has one.
+    #[serde(default)]
+    pub command: Option<PanelCommands>,
     /// Keys whose values come from memory or one secondary source.
     pub unverified: Vec<String>,
 }
@@ -167,6 +189,7 @@ impl PanelProfile {
             unmodulated: 0.0,
             beam: None,
             corrections: Vec::new(),
+            command: None,
             unverified: Vec::new(),
         })
     }

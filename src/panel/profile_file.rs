@@ -96,6 +96,7 @@ fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
         "settle_time",
         "refresh",
         "edid",
+        "command",
         "signal",
         "correction",
         "response",
@@ -139,6 +140,7 @@ fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
         refresh: file.refresh.map(|t| at.read("refresh", t, units::frequency)).transpose()?,
         edid: file.edid,
         corrections,
+        command: file.command,
         crosstalk: file.crosstalk,
         unmodulated: at.within("unmodulated", file.unmodulated, 0.0..=1.0)?,
         beam: file.beam.map(|path| at.beside(&path)),
@@ -265,7 +267,7 @@ fn response(at: &ConfigFile<'_>, file: &ResponseFile, modulation: Modulation, le
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::panel::PhaseSign;
+    use crate::panel::{PanelCommands, PhaseSign};
 
     #[test]
     fn every_embedded_profile_is_right_and_named_as_its_file() {
@@ -305,6 +307,7 @@ mod tests {
         profile.crosstalk = 0.35;
         profile.unmodulated = 0.07;
         profile.beam = Some("beam.npy".into());
+        profile.command = Some(PanelCommands { before: Some("slmctl on --port 'COM 3'".into()), after: None });
         profile.corrections = vec![CorrectionFile { file: "flat.npy".into(), wavelength: Some(532.123456789e-9) }];
         let polynomial = |range: f64| Curve::Polynomial { coefficients: vec![0.0, range, 0.1] };
         let curves = vec![polynomial(6.0), polynomial(6.1), polynomial(6.2)];

@@ -1,6 +1,6 @@
 //! The keys of a profile's TOML file, as they are read and written.
 
-use super::profile::PanelKind;
+use super::profile::{PanelCommands, PanelKind};
 use super::response::PhaseSign;
 use super::signal::Packing;
 use crate::config::Quantity;
@@ -35,6 +35,7 @@ pub(super) struct ProfileFile {
     pub(super) edid: Option<String>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) unverified: Vec<String>,
+    pub(super) command: Option<PanelCommands>,
     pub(super) signal: Option<SignalFile>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) correction: Vec<CorrectionEntry>,

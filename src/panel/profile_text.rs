@@ -40,6 +40,7 @@ impl PanelProfile {
             refresh: self.refresh.map(|rate| Quantity(format!("{rate:?}Hz"))),
             edid: self.edid.clone(),
             unverified: self.unverified.clone(),
+            command: self.command.clone(),
             signal: Some(SignalFile {
                 packing: signal.packing,
                 width: Some(signal.width),

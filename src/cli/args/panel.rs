@@ -14,6 +14,9 @@ pub(crate) struct PanelArgs {
     /// Vacuum wavelength, with its unit [default: the panel's first].
     #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) wavelength: Option<f64>,
+    /// Let the profile run its [command]s before and after frames are on a monitor.
+    #[arg(hide_short_help = true, long)]
+    pub(crate) allow_command: bool,
 }
 
 /// A hologram for each of three lasers.

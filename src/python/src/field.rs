@@ -231,8 +231,8 @@ impl<'py> Given<'py> {
             }
             Kind::Real => {
                 let (_, phases) = crate::arrays::real_plane(value, "field")?;
-                let samples = py.detach(|| phases.into_iter().map(Complex32::cis).collect());
-                let field = holodrive::field::Field::new(grid, setup.wavelength, samples).raise(py)?;
+                let waves = |_: &_| holodrive::field::Field::of_phases(grid, setup.wavelength, &phases);
+                let field = run(py, None, waves)?;
                 Ok(Self::Array { samples: Samples::Own(field), are_phases: true })
             }
             Kind::Whole => {
