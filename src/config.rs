@@ -35,6 +35,19 @@ impl<'de> Deserialize<'de> for Quantity {
     }
 }
 
+/// What the reader of TOML says, in one line and in words of TOML rather than of Rust.
+fn plain(message: &str) -> String {
+    let mut said = message.replace('\n', " ");
+    for whole in ["usize", "u64", "u32", "u16", "u8", "i64"] {
+        said = said.replace(&format!("expected {whole}"), "expected a whole number");
+    }
+    said = said.replace("expected f64", "expected a number, without quotes");
+    if said.contains("map, expected a sequence") {
+        said += "; a table of which there may be several has two brackets, such as [[response]]";
+    }
+    said
+}
+
 /// A configuration file: what is wrong in it is told with its name and the key.
 #[derive(Clone, Copy)]
 pub(crate) struct ConfigFile<'a> {
@@ -46,8 +59,10 @@ impl ConfigFile<'_> {
     pub(crate) fn parse<T: de::DeserializeOwned>(&self, text: &str) -> Result<T> {
         toml::from_str(text).map_err(|e| {
             let line = e.span().map_or(1, |span| text[..span.start.min(text.len())].matches('\n').count() + 1);
-            // Serde's lists of expected keys are long; one line is what the user reads.
-            Error::calibration(self.source, format!("line {line}: {}", e.message().replace('\n', " ")))
+            let said = plain(e.message());
+            // What is missing from all of the file is on no line.
+            let is_missing = line == 1 && said.starts_with("missing field");
+            Error::calibration(self.source, if is_missing { said } else { format!("line {line}: {said}") })
         })
     }
 

@@ -63,6 +63,9 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
 
 /// Makes the folder `path` if it is not there, and proves that files can be written in it.
 pub fn output_folder(path: &Path) -> Result<()> {
+    if path.is_file() {
+        return Err(Error::input(path, "is a file; what is written here needs a folder"));
+    }
     fs::create_dir_all(path).map_err(Error::io(path))?;
     let probe = partial_name(&path.join("probe"));
     create(&probe).map_err(Error::io(path))?;

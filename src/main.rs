@@ -2,6 +2,7 @@
 
 fn main() -> std::process::ExitCode {
     keep_memory();
+    outlive_limits();
     let arguments: Vec<_> = std::env::args_os().collect();
     holodrive::cli::main(&arguments).into()
 }
@@ -23,3 +24,15 @@ fn keep_memory() {
 
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 fn keep_memory() {}
+
+/// A file that grows beyond what this process may write is a failed write, with its line and its clearing up, not the end.
+#[cfg(unix)]
+fn outlive_limits() {
+    // SAFETY: no handler is installed, the signal is ignored; before there is a second thread.
+    unsafe {
+        libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
+    }
+}
+
+#[cfg(not(unix))]
+fn outlive_limits() {}

@@ -52,7 +52,12 @@ fn unknown(text: &str, names: &[&str]) -> String {
 
 /// "did you mean `…`? " with the one of `names` that `text` most probably was meant to be; empty where none is near.
 pub(crate) fn meant(text: &str, names: &[&str]) -> String {
+    // What stands on a box is in capitals.
+    let text = &text.to_lowercase();
     let likeness = |name: &str| {
+        if text.len() > 3 && name.contains(text.as_str()) {
+            return 1.0;
+        }
         let parts = name.split('-').map(|part| 0.95 * strsim::jaro(text, part)).fold(0.0, f64::max);
         strsim::jaro(text, name).max(parts)
     };

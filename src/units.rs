@@ -1,6 +1,6 @@
 //! Lengths, angles, times and rates as people write them (`8um`, `632.8nm`, `2deg`, `10ms`, `60Hz`) to SI f64 and back.
 //!
-//! A bare number is refused: at the border every quantity says its unit.
+//! A bare number but 0 is refused: at the border every quantity says its unit.
 //!
 //! ```
 //! use holodrive::units;
@@ -53,6 +53,10 @@ fn parse(text: &str, units: &[(&'static str, f64)], kind: &'static str, example:
     let value: f64 = number
         .parse()
         .map_err(|_| Error::parameter(kind, format!("`{text}` is not a number with a unit, such as {example}")))?;
+    // Nothing is nothing in any unit.
+    if unit.is_empty() && value == 0.0 {
+        return Ok(0.0);
+    }
     if unit.is_empty() {
         return Err(Error::parameter(kind, format!("`{text}` has no unit; write it as {example}")));
     }
@@ -101,10 +105,24 @@ pub fn positive_length(text: &str) -> Result<f64> {
     positive(length(text)?, text, "length")
 }
 
+/// Reads a vacuum wavelength of light that panels modulate: 100 nm to 30 µm, so that 532mm is seen to be a slip.
+pub fn wavelength(text: &str) -> Result<f64> {
+    let value = positive_length(text)?;
+    if WAVELENGTHS.contains(&value) {
+        return Ok(value);
+    }
+    Err(Error::out_of_range("wavelength", quoted(text), "must be 100nm to 30um; look at its unit"))
+}
+
+/// Wavelengths of light that panels modulate [m].
+pub(crate) const WAVELENGTHS: std::ops::RangeInclusive<f64> = 100e-9..=30e-6;
+
 /// Reads a distance of neighbouring pixels: a length, or dots per inch: `5080dpi` → 5e-6 [m].
 pub fn pitch(text: &str) -> Result<f64> {
-    match text.trim().strip_suffix("dpi") {
-        Some(_) => {
+    let text = text.trim();
+    match text.strip_suffix("dpi").or_else(|| text.strip_suffix("DPI")) {
+        Some(number) => {
+            let text = &format!("{number}dpi");
             let dots = positive(parse(text, &[("dpi", 1.0)], "pitch", "5080dpi")?, text, "pitch")?;
             Ok(0.0254 / dots)
         }
@@ -196,6 +214,13 @@ mod tests {
         assert!(length("8").unwrap_err().to_string().contains("no unit"));
         assert!(positive_length("0m").is_err());
         assert!(angle("2m").is_err());
+        assert_eq!(length("0").expect("nothing"), 0.0);
+        assert_eq!(pitch("5080DPI").expect("dpi"), pitch("5080dpi").expect("dpi"));
+        for slip in ["532mm", "532um", "1nm", "-532nm", "0nm"] {
+            assert!(wavelength(slip).is_err(), "{slip} was accepted");
+        }
+        assert!(wavelength("532mm").unwrap_err().to_string().contains("`532mm`"));
+        assert!((wavelength("10.6um").expect("a CO2 laser's") - 10.6e-6).abs() < 1e-18);
     }
 
     #[test]

@@ -55,6 +55,16 @@ fn built_in_panels_are_listed_with_what_nobody_has_checked() {
     let line = line("meadowlark-p1920");
     assert!(line.contains(" 9.2um? ") && line.contains(" 8 bit ") && line.contains("not checked: pitch, "), "{out}");
     refused(f, &["panels", "-o", "no/such/panels.json"], "no/such/panels.json");
+    // One of them, to begin one's own with.
+    done(f, &["panels", "generic", "-o", "mine.toml"]);
+    assert_eq!(
+        fs::read(f.join("mine.toml")).expect("mine"),
+        fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/calib/generic.toml")).expect("ours")
+    );
+    let told = done(f, &["plates", "small"]);
+    assert_eq!(told["profile"].as_str(), Some(include_str!("../calib/plate-small.toml")));
+    refused(f, &["panels", "generik"], "generic");
+    refused(f, &["plates", "mine.toml"], "mine.toml");
 }
 
 #[test]

@@ -190,7 +190,7 @@ fn curves_that_differ_over_the_panel_are_found_by_region() {
         .skip(1)
         .filter_map(|line| {
             let words: Vec<&str> = line.split(',').collect();
-            (words[2] == "1" && words[3] == "0").then(|| format!("{},{}\n", words[1], words[4]))
+            (words[2] == "1" && words[3] == "0").then(|| format!("{},{}\n", words[1], words[5]))
         })
         .collect();
     fs::write(f.join("one.csv"), pooled).expect("write");

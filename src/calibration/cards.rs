@@ -135,9 +135,8 @@ fn lenses(grid: Grid, wavelength: f64, distance: f64) -> Result<Vec<f32>> {
     let zones = (0.5 * side).powi(2) / (wavelength * distance);
     if zones < 1.0 {
         let what = format!(
-            "{} m: {:.1} Fresnel zones of a lens are no lens; take a distance below {} m",
-            distance,
-            zones,
+            "{}: the panel is too small for lenses that focus so far away; take a distance below {}",
+            crate::units::show_length(distance),
             crate::units::show_length((0.5 * side).powi(2) / wavelength)
         );
         return Err(Error::parameter("distance", what));

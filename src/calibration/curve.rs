@@ -79,7 +79,7 @@ pub fn measure_curve(
     order: Order,
     degree: Option<usize>,
 ) -> Result<MeasuredCurve> {
-    let measured = read_powers(powers, profile.levels())?;
+    let measured = read_powers(powers, profile.levels(), wavelength)?;
     let CurveFit { curve, uncertainty, residual, range, degree } =
         fit(&measured, profile.levels(), order, degree, powers)?;
     let uncertainty_most = uncertainty.iter().fold(0.0, |a: f64, &b| a.max(b));

@@ -52,7 +52,8 @@ impl PanelProfile {
         out.responses.insert(0, Response { wavelength: Some(wavelength), curve });
         out.unverified.retain(|key| key != "response");
         if !out.wavelengths.iter().any(|own| (own - wavelength).abs() <= 1e-9) {
-            out.wavelengths.push(wavelength);
+            // First, so that it is the one that the profile is used for where none is named.
+            out.wavelengths.insert(0, wavelength);
         }
         out
     }

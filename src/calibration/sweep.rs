@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::names::{Name, Named};
 use crate::panel::vendor::text;
 use crate::panel::{Frame, PanelProfile};
+use crate::units::{self, show_length};
 use serde::Serialize;
 use std::path::Path;
 
@@ -26,6 +27,9 @@ impl Named for Order {
         ("zero", || Self::Zero, "the detector saw the undiffracted light"),
     ];
 }
+
+/// Wavelengths [m] closer than this are one laser's.
+const SAME_LIGHT: f64 = 0.05e-9;
 
 /// A part of a panel whose phase is measured by itself: `place` of `parts`, counted in columns and rows from the upper left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,21 +120,23 @@ impl Sweep {
             return Err(Error::parameter("order", "regions are told apart in the first order only"));
         }
         let (parts, stripe) = (self.regions, self.stripe);
+        // In each line, so that powers of one laser are not taken for another's.
+        let light = show_length(wavelength);
         let make = move |index: usize| {
             let (region, index) = (index / count, index % count);
             let level = (index as f64 * (all - 1) as f64 / (count - 1) as f64).round() as u16;
             let region = parts.map(|parts| Region { place: (region % parts.0, region / parts.0), parts });
             let frame = grating_frame(profile, wavelength, &Grating { fixed: 0, level, stripe, region })?;
             Ok(match region.map(|region| region.place) {
-                None => Entry { name: format!("level-{level:05}.png"), cells: format!("{level},"), frame },
+                None => Entry { name: format!("level-{level:05}.png"), cells: format!("{level},{light},"), frame },
                 Some((column, row)) => Entry {
                     name: format!("region-{column}-{row}-level-{level:05}.png"),
-                    cells: format!("{level},{column},{row},"),
+                    cells: format!("{level},{column},{row},{light},"),
                     frame,
                 },
             })
         };
-        let columns = if parts.is_some() { "level,column,row,power" } else { "level,power" };
+        let columns = if parts.is_some() { "level,column,row,wavelength,power" } else { "level,wavelength,power" };
         Ok(FrameSeries::new(columns, regions * count, make))
     }
 
@@ -157,8 +163,9 @@ pub struct Power {
 /// `#`.
 ///
 /// # Errors
-/// [`Error::Calibration`] with the line that is not right, or whose level the panel does not have.
-pub fn read_powers(path: &Path, levels: usize) -> Result<Vec<Power>> {
+/// [`Error::Calibration`] with the line that is not right, whose level the panel does not have, or whose column `wavelength` says that it
+/// was measured in other light than `wavelength` [m].
+pub fn read_powers(path: &Path, levels: usize, wavelength: f64) -> Result<Vec<Power>> {
     let text = text(path)?;
     let mut columns: Vec<String> = Vec::new();
     let mut powers: Vec<Power> = Vec::new();
@@ -191,6 +198,16 @@ pub fn read_powers(path: &Path, levels: usize) -> Result<Vec<Power>> {
         let word = |name: &str| columns.iter().position(|column| column == name).map(|at| words[at]);
         let whole =
             |name: &str| word(name).filter(|w| !w.is_empty()).map(str::parse::<usize>).transpose().map_err(drop);
+        if let Some(light) = word("wavelength").filter(|word| !word.is_empty()) {
+            match units::wavelength(light) {
+                Ok(own) if (own - wavelength).abs() > SAME_LIGHT => {
+                    let asked = show_length(wavelength);
+                    return refuse(format!("measured at {light}, not at {asked}: give --wavelength {light}"));
+                }
+                Ok(_) => {}
+                Err(_) => return refuse(format!("`{light}` is no wavelength, such as 532nm")),
+            }
+        }
         let power = word("power").unwrap_or_default();
         let (Ok(Some(level)), Ok(column), Ok(row)) = (whole("level"), whole("column"), whole("row")) else {
             return refuse(format!("`{line}` does not hold whole numbers for level, column and row"));

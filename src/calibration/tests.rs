@@ -93,10 +93,15 @@ fn sweeps_that_tell_nothing_are_refused() {
     let file = folder.path().join("p.csv");
     std::fs::write(&file, "level,power\n0,0.1\n# remark\n1;0.2\n255\t3e-3\n").expect("write");
     let whole = |level: u16, power: f64| Power { level, region: None, power };
-    assert_eq!(read_powers(&file, 256).expect("read"), [whole(0, 0.1), whole(1, 0.2), whole(255, 3e-3)]);
+    assert_eq!(read_powers(&file, 256, 532e-9).expect("read"), [whole(0, 0.1), whole(1, 0.2), whole(255, 3e-3)]);
     std::fs::write(&file, "power,file,row,column,level\n0.5,a.png,1,2,7\n").expect("write");
-    assert_eq!(read_powers(&file, 256).expect("read"), [Power { level: 7, region: Some((2, 1)), power: 0.5 }]);
+    assert_eq!(read_powers(&file, 256, 532e-9).expect("read"), [Power { level: 7, region: Some((2, 1)), power: 0.5 }]);
+    std::fs::write(&file, "level,wavelength,power\n7,532nm,0.5\n").expect("write");
+    assert_eq!(read_powers(&file, 256, 532e-9).expect("read"), [whole(7, 0.5)]);
+    let other = read_powers(&file, 256, 632.8e-9).expect_err("another laser").to_string();
+    assert!(other.contains("line 2: measured at 532nm, not at 632.8nm"), "{other}");
     for (text, word) in [
+        ("level,wavelength,power\n3,green,1\n", "`green` is no wavelength"),
         ("0,1\n256,1\n", "line 2: level 256"),
         ("0,1\nx,1\n", "line 2"),
         ("0,1,2\n", "line 1"),
@@ -107,7 +112,7 @@ fn sweeps_that_tell_nothing_are_refused() {
         ("# nothing\n", "no powers"),
     ] {
         std::fs::write(&file, text).expect("write");
-        let error = read_powers(&file, 256).expect_err(word).to_string();
+        let error = read_powers(&file, 256, 532e-9).expect_err(word).to_string();
         assert!(error.contains(word), "{error}");
     }
     assert!(grating_frame(&panel(8, 4), WAVELENGTH, &grating(300, 2)).is_err());

@@ -71,9 +71,10 @@ fn curve(args: &CurveArgs, powers: &Path) -> Result<Report> {
     }
     report.section(found);
     report.line(format!(
-        "curve        {:>8}  {:.3}π from the lowest level to the highest, uncertain by {:.4} rad RMS, {:.4} rad at most; \
+        "curve        {:>8}  at {}: {:.3}π from the lowest level to the highest, uncertain by {:.4} rad RMS, {:.4} rad at most; \
          polynomial of degree {}{}",
         seconds(begin.elapsed().as_secs_f64()),
+        show_length(panel.wavelength),
         found.range / PI,
         found.uncertainty_rms,
         found.uncertainty_most,
@@ -122,7 +123,8 @@ fn flatness(args: &FlatnessArgs) -> Result<Report> {
     } else {
         format!(", {:.2} from lowest to highest", found.span / TAU)
     };
-    report.line(format!("wavefront    {:.3} waves RMS about its mean{beside}", found.rms / TAU));
+    let light = show_length(wavelength);
+    report.line(format!("wavefront    {:.3} waves of {light} RMS about its mean{beside}", found.rms / TAU));
     report.output("correction", output);
     if let Some(into) = &args.into {
         report.file("profile", "profile", into);

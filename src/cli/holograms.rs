@@ -145,6 +145,9 @@ impl Maker<'_> {
         notes: Option<String>,
         report: &mut Report,
     ) -> Result<Frame> {
+        // A field of another program may stand on the panel all the same, where it was carried there from a plane that nobody named.
+        report
+            .warn(content.on_panel().err().map(|elsewhere| format!("{elsewhere}; it is encoded as if it stood on it")));
         let begin = Instant::now();
         if let Some(crate::encode::Encoding::Planes(planes)) = &self.settings.encode.encoding {
             planes.depths.iter().for_each(|z| report.check_side("depths", *z, content.depth));

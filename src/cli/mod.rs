@@ -113,6 +113,9 @@ pub fn main(arguments: &[OsString]) -> u8 {
         Ok(()) => 0,
         Err(error) => {
             match (&error, kept) {
+                (Error::Interrupted, Some(folder)) if !folder.exists() => {
+                    eprintln!("holodrive: interrupted before the first tile; nothing was written");
+                }
                 (Error::Interrupted, Some(folder)) => {
                     let folder = folder.display();
                     eprintln!(

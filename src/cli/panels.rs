@@ -2,10 +2,11 @@
 
 use super::args::PanelsArgs;
 use super::report::Report;
-use crate::Result;
 use crate::panel::{Modulation, PanelKind, PanelProfile};
 use crate::units::{show_length, show_pitch};
+use crate::{Error, Result, files};
 use serde::Serialize;
+use std::path::Path;
 
 /// What a profile says of a panel, all lengths in metres.
 #[derive(Serialize)]
@@ -71,9 +72,30 @@ impl Listed {
     }
 }
 
-/// Lists the built-in profiles.
+/// Shows a built-in profile's TOML, or writes it to a file.
+pub(super) fn give_out(text: Option<&'static str>, output: Option<&Path>, report: &mut Report) -> Result<()> {
+    let Some(text) = text else {
+        return Err(Error::parameter("NAME", "is a file already; give the name of a built-in profile"));
+    };
+    match output {
+        Some(path) => {
+            files::write_bytes(path, text.as_bytes())?;
+            report.output("profile", path);
+        }
+        None => report.add("profile", text, text.trim_end()),
+    }
+    Ok(())
+}
+
+/// Lists the built-in profiles, or gives one of them out.
 pub(super) fn panels(args: &PanelsArgs) -> Result<Report> {
     let mut report = Report::new("panels");
+    if let Some(name) = &args.name {
+        // The usual words for a name that is none.
+        PanelProfile::find(name)?;
+        give_out(PanelProfile::embedded_text(name), args.output.as_deref(), &mut report)?;
+        return Ok(report);
+    }
     let all = PanelProfile::embedded_names()
         .map(|name| PanelProfile::find(name).map(Listed::new))
         .collect::<Result<Vec<_>>>()?;

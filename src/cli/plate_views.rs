@@ -2,6 +2,7 @@
 
 use super::args::{LampAsked, LookArgs, PreviewArgs, SheetArgs};
 use super::bar::Bar;
+use super::output;
 use super::plate_source;
 use super::report::{Report, seconds};
 use crate::print::preview::PreviewSettings;
@@ -92,9 +93,12 @@ fn aside(args: &LookArgs, settings: &PreviewSettings, by: f64, progress: &Progre
 fn warn_of_dark(views: &[&PlateView], report: &mut Report) -> Result<()> {
     let mut places = Vec::new();
     for view in views {
-        let (plate, [x, _, z]) = (view.plate(), view.report.eye);
-        let reach = 0.5 * plate.raster.grid().extent_x() + z * plate.segments()?.band.angle[0].tan();
-        if x.abs() > reach {
+        let (plate, [x, y, z]) = (view.plate(), view.report.eye);
+        let (grid, angle) = (plate.raster.grid(), plate.segments()?.band.angle);
+        let reach = |extent: f64, angle: f64| 0.5 * extent + z * angle.tan();
+        if y.abs() > reach(grid.extent_y(), angle[1]) {
+            places.push(format!("{} (y = {})", show_length(x), show_length(y)));
+        } else if x.abs() > reach(grid.extent_x(), angle[0]) {
             places.push(show_length(x));
         }
     }
@@ -110,7 +114,9 @@ pub(super) fn preview(args: &PreviewArgs) -> Result<Report> {
     let mut report = Report::new("print preview");
     let bar = Bar::new();
     let (share, progress) = (args.look.white, &bar.progress);
+    output::check(&args.output, &["png"])?;
     let (mut view, settings) = look(&args.look, &mut report, progress)?;
+    warn_of_dark(&[&view], &mut report)?;
     if let Some(of) = &args.traced {
         let path = beside(&args.output, "traced");
         let [alike, smooth] = view.compare(&plate_source::same(of)?, &path, args.bare, progress)?;
@@ -154,7 +160,7 @@ pub(super) fn sheet(args: &SheetArgs) -> Result<Report> {
     let mut report = Report::new("print sheet");
     let bar = Bar::new();
     let (view, _) = look(&args.look, &mut report, &bar.progress)?;
-    write_sheet(&args.look.folder, &view, view.white(args.look.white), &args.output)?;
+    write_sheet(&args.look.folder, &view, view.white(args.look.white), &args.output, &bar.progress)?;
     report.section(&view.report);
     report.output("sheet", &args.output);
     Ok(report)

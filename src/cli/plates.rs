@@ -1,6 +1,7 @@
 //! The plates whose profiles the program carries, their printers, and which of their figures nobody has checked.
 
 use super::args::PlatesArgs;
+use super::panels::give_out;
 use super::report::Report;
 use crate::Result;
 use crate::print::{Asked, Plate, Quantity};
@@ -87,9 +88,14 @@ fn millimetres(metres: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// Lists the built-in plates.
+/// Lists the built-in plates, or gives the profile of one out.
 pub(super) fn plates(args: &PlatesArgs) -> Result<Report> {
     let mut report = Report::new("plates");
+    if let Some(name) = &args.name {
+        Plate::find(name, &Asked::default())?;
+        give_out(Plate::embedded_text(name), args.output.as_deref(), &mut report)?;
+        return Ok(report);
+    }
     let all = Plate::embedded_names()
         .map(|name| Plate::find(name, &Asked::default()).map(Listed::new))
         .collect::<Result<Vec<_>>>()?;

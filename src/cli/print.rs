@@ -60,7 +60,10 @@ pub(super) struct Lighting<'a> {
 fn resolved(args: &PrintArgs) -> Result<PrintSettings> {
     let missing = |what: &str| Error::parameter("print", format!("{what} (see holodrive print --help)"));
     let input = args.input.clone().ok_or_else(|| missing("a scene or points are needed"))?;
-    let path = args.plate.as_ref().ok_or_else(|| missing("--plate NAME or FILE is needed"))?;
+    let path = args
+        .plate
+        .as_ref()
+        .ok_or_else(|| missing("--plate NAME or FILE is needed: `holodrive plates` lists the built-in ones"))?;
     let folder = match &args.output {
         None if !args.dry_run => return Err(missing("-o DIR is needed")),
         folder => folder.clone().unwrap_or_default(),

@@ -46,9 +46,18 @@ pub(super) fn reconstruct(args: &ReconstructArgs) -> Result<Report> {
             report.check_side("distance", distance, content.depth);
             View::Plane { z: distance - content.z }
         }
-        _ => return Err(Error::parameter("distance", "give --distance, or --eye with --focus")),
+        _ => {
+            return Err(Error::parameter(
+                "distance",
+                "give --distance for a sensor's plane, or --eye X,Y,Z with --focus for what an eye sees",
+            ));
+        }
     };
-    let half = args.half.map_or_else(|| view.seen_half(&field.grid, content.eye), |[x, y]| DVec2::new(x, y));
+    let half = match (args.half, args.size) {
+        (Some([x, y]), _) => DVec2::new(x, y),
+        (None, None) => view.seen_half(&field.grid, content.eye),
+        (None, Some(size)) => reconstruction::square_half(view.seen_half(&field.grid, content.eye), size),
+    };
     let begin = Instant::now();
     if let (Some(views), Some(eye_box)) = (args.views, args.eye_box) {
         let look = |view: &View, size| reconstruction::picture(&field, view, half, size, &settings, &bar.progress);

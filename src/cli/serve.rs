@@ -38,6 +38,9 @@ pub(super) fn serve(args: &ServeArgs, json: bool) -> Result<Report> {
     }
     let service = Service::resolve(args, json, &mut report)?;
     let bar = Bar::new();
+    if args.until_stdin_closes {
+        stop_at_the_end_of(std::io::stdin(), std::sync::Arc::clone(&bar.progress));
+    }
     let kept = if monitor == "none" {
         let server = service.start()?;
         let mut output = SimulatedOutput::new(args.output.as_deref(), &service.idle)?;
@@ -53,6 +56,14 @@ pub(super) fn serve(args: &ServeArgs, json: bool) -> Result<Report> {
     );
     report.add_serialised("served", &kept, line);
     Ok(report)
+}
+
+/// Stops when what is read ends; the thread that reads goes with the process.
+fn stop_at_the_end_of(mut input: impl std::io::Read + Send + 'static, progress: std::sync::Arc<Progress>) {
+    std::thread::spawn(move || {
+        let _ = std::io::copy(&mut input, &mut std::io::sink());
+        progress.stop();
+    });
 }
 
 #[cfg(feature = "display")]

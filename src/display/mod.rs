@@ -51,6 +51,7 @@ mod region;
 mod serving;
 mod session;
 mod show;
+mod taken;
 mod test_card;
 mod trigger;
 mod vblank;

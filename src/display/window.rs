@@ -7,6 +7,7 @@ use super::monitor::Monitor;
 use super::native::NativeWindow;
 use super::presenter::{Presenter, Surface};
 use super::session::{Display, name_of};
+use super::taken::Taken;
 use super::trigger::TriggerPatch;
 use super::vblank::VerticalBlank;
 use crate::error::{Error, Result};
@@ -83,6 +84,7 @@ pub struct PanelWindow {
     covered: u64,
     absent: Option<String>,
     warnings: Vec<String>,
+    _taken: Taken,
 }
 
 /// The parts that exist only while the monitor is there. The surface goes before the window that it draws into.
@@ -110,6 +112,7 @@ impl PanelWindow {
     ) -> Result<Self> {
         let monitors = display.monitors()?;
         let monitor = choice.find(&monitors)?;
+        let taken = Taken::new(&monitor)?;
         let first = marked(first, settings.trigger, 0)?;
         let (open, warnings) = Open::new(display, &monitor, &first, settings)?;
         Ok(Self {
@@ -121,6 +124,7 @@ impl PanelWindow {
             covered: 0,
             absent: None,
             warnings,
+            _taken: taken,
         })
     }
 

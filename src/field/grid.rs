@@ -15,6 +15,7 @@
 //! ```
 
 use crate::error::{Error, Result};
+use crate::units::{WAVELENGTHS, show_length};
 
 /// A rectangular lattice of samples on a plane of constant z.
 ///
@@ -131,6 +132,18 @@ pub(crate) fn offset(index: f64, count: f64, pitch: f64) -> f64 {
 
 /// Smallest and largest length [m] that is taken for one: beyond them phases and areas lose their digits.
 pub(crate) const LENGTHS: std::ops::RangeInclusive<f64> = 1e-12..=1e9;
+
+/// Distances of a panel's pixels [m]: what lies beyond is a slip of the unit.
+pub(crate) const PITCHES: std::ops::RangeInclusive<f64> = 50e-9..=1e-3;
+
+/// Refuses a wavelength [m] that no panel is made for.
+pub(crate) fn light(wavelength: f64) -> Result<()> {
+    if WAVELENGTHS.contains(&wavelength) {
+        return Ok(());
+    }
+    let value = if wavelength.is_finite() { show_length(wavelength) } else { format!("{wavelength} m") };
+    Err(Error::out_of_range("wavelength", value, "must be 100nm to 30um; look at its unit"))
+}
 
 /// Refuses a length [m] that is not positive and finite, or none of a bench.
 pub(crate) fn positive(name: &'static str, length: f64) -> Result<()> {

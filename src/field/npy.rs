@@ -6,6 +6,7 @@
 use crate::error::{Error, Result};
 use crate::field::arrays::{self, Values};
 use crate::files;
+use crate::units::show_length;
 use npyz::{Order, WriterBuilder};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -43,6 +44,22 @@ pub struct Content {
     /// Half width and half height of the viewing window on the panel plane [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub window: Option<[f64; 2]>,
+}
+
+impl Content {
+    /// Refuses a field that does not stand on the panel, where it has to be encoded.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] with the distance that brings it there.
+    pub fn on_panel(&self) -> Result<()> {
+        // What is left of a way there and back.
+        if self.z.abs() < 1e-9 {
+            return Ok(());
+        }
+        let [own, back] = [self.z, -self.z].map(show_length);
+        let what = format!("stands at z = {own}, not on the panel: propagate it by {back} first");
+        Err(Error::parameter("field", what))
+    }
 }
 
 /// The convention that every field file states.

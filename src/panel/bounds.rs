@@ -5,7 +5,8 @@
 use super::drive_curve::Modulation;
 use super::frame::{FrameMetadata, Illumination};
 use super::profile::{PanelKind, PanelProfile};
-use crate::field::grid::LENGTHS;
+use crate::field::grid::{PITCHES, light};
+use crate::units::WAVELENGTHS;
 
 /// Longest side of a panel [px].
 const LONGEST: usize = 1 << 16;
@@ -53,8 +54,8 @@ impl PanelProfile {
         if !(0.0..=8.0).contains(&self.crosstalk) {
             return Err(format!("crosstalk = {} must be 0 … 8 pixels", self.crosstalk));
         }
-        within("pitch", self.pitch_x, LENGTHS, "m")?;
-        within("pitch", self.pitch_y, LENGTHS, "m")?;
+        within("pitch", self.pitch_x, PITCHES, "m; look at its unit")?;
+        within("pitch", self.pitch_y, PITCHES, "m; look at its unit")?;
         within("settle_time", self.settle_time.unwrap_or(0.0), 0.0..=LONGEST_TIME, "s")?;
         within("refresh", self.refresh.unwrap_or(1.0), 1e-9..=HIGHEST_RATE, "Hz")?;
         if self.wavelengths.is_empty() || self.responses.is_empty() {
@@ -66,7 +67,7 @@ impl PanelProfile {
         let measured = self.responses.iter().map(|r| r.wavelength);
         let measured = measured.chain(self.corrections.iter().map(|c| c.wavelength)).flatten();
         for wavelength in self.wavelengths.iter().copied().chain(measured) {
-            within("wavelength", wavelength, LENGTHS, "m")?;
+            within("wavelength", wavelength, WAVELENGTHS, "m; look at its unit")?;
         }
         for response in &self.responses {
             if response.curve.modulation() != self.modulation() {
@@ -90,14 +91,7 @@ impl FrameMetadata {
     /// The first number outside its domain, in words.
     pub(super) fn check(&self) -> Result<(), String> {
         self.panel.check()?;
-        if !LENGTHS.contains(&self.wavelength) {
-            return Err(format!(
-                "wavelength = {:e} m must be {:e} … {:e} m",
-                self.wavelength,
-                LENGTHS.start(),
-                LENGTHS.end()
-            ));
-        }
+        light(self.wavelength).map_err(|error| error.to_string())?;
         if self.levels_for_2pi.is_some_and(|levels| !(levels > 0.0 && levels.is_finite())) {
             return Err("levels_for_2pi must be greater than zero".into());
         }

@@ -269,6 +269,10 @@ fn text_chunk(path: &Path, info: &png::Info<'_>) -> Result<Option<FrameMetadata>
             None => return Ok(None),
         },
     };
+    let said: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    if said.get("simulated").is_some() && said.get("panel").is_none() {
+        return Err(Error::input(path, "is a picture of what is seen, not a frame of levels; give the frame"));
+    }
     let metadata: FrameMetadata = serde_json::from_str(&text)
         .map_err(|e| Error::input(path, format!("its metadata is damaged ({e}); write the frame again")))?;
     metadata

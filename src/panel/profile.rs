@@ -6,6 +6,7 @@ use super::response::{Curve, PhaseSign, Response};
 use super::signal::{Packing, SignalLayout};
 use crate::error::{Error, Result};
 use crate::field::Grid;
+use crate::field::grid::{PITCHES, light};
 use crate::units::show_length;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -157,16 +158,16 @@ impl PanelProfile {
                 return Err(Error::out_of_range(name, size, "must be 1 … 65536 pixels"));
             }
         }
-        for (name, length) in [("panel pitch", pitch), ("panel wavelength", wavelength)] {
-            if !(length > 0.0 && length.is_finite()) {
-                return Err(Error::out_of_range(name, length, "m must be greater than zero"));
-            }
-        }
         if !(1..=8).contains(&bits) {
             return Err(Error::out_of_range("panel bits", bits, "must be 1 … 8"));
         }
+        if !PITCHES.contains(&pitch) {
+            let limit = "must be 50nm to 1mm; look at its unit";
+            return Err(Error::out_of_range("panel pitch", format!("{pitch:e} m"), limit));
+        }
+        light(wavelength)?;
         let name = format!("{kind:?} {width}×{height}");
-        Ok(Self {
+        let profile = Self {
             source: PathBuf::from(&name),
             name,
             maker: "ideal".into(),
@@ -191,7 +192,9 @@ impl PanelProfile {
             corrections: Vec::new(),
             command: None,
             unverified: Vec::new(),
-        })
+        };
+        profile.check().map_err(|what| Error::parameter("panel", what))?;
+        Ok(profile)
     }
 
     /// What a user should know before trusting the profile: one line a fact that nobody has checked.

@@ -40,6 +40,11 @@ impl PanelProfile {
         ))
     }
 
+    /// The TOML of an embedded profile, as it stands in `calib/`: what one's own begins with.
+    pub fn embedded_text(name: &str) -> Option<&'static str> {
+        PROFILES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+    }
+
     /// Names of the embedded profiles.
     pub fn embedded_names() -> impl Iterator<Item = &'static str> {
         PROFILES.iter().map(|(name, _)| *name)
@@ -73,7 +78,7 @@ fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
     let wavelengths = file
         .wavelengths
         .iter()
-        .map(|text| at.read("wavelengths", text, units::positive_length))
+        .map(|text| at.read("wavelengths", text, units::wavelength))
         .collect::<Result<Vec<_>>>()?;
     if wavelengths.is_empty() {
         return at.refuse("wavelengths is empty; give at least one, such as [\"632.8nm\"]");
@@ -112,7 +117,7 @@ fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
     let responses = file.response.iter().map(|r| response(&at, r, modulation, levels)).collect::<Result<Vec<_>>>()?;
     let signal = signal(&at, file.signal, file.width, file.height, file.bits)?;
     let correction = |entry: &CorrectionEntry| {
-        let read = |text| at.read("correction.wavelength", text, units::positive_length);
+        let read = |text| at.read("correction.wavelength", text, units::wavelength);
         let wavelength = entry.wavelength.as_ref().map(read).transpose()?;
         Ok(CorrectionFile { file: at.beside(&entry.file), wavelength })
     };
@@ -258,7 +263,7 @@ fn response(at: &ConfigFile<'_>, file: &ResponseFile, modulation: Modulation, le
     }
     curve.check(levels, at.source)?;
     let wavelength = match &file.wavelength {
-        Some(text) => Some(at.read("response.wavelength", text, units::positive_length)?),
+        Some(text) => Some(at.read("response.wavelength", text, units::wavelength)?),
         None => None,
     };
     Ok(Response { wavelength, curve })

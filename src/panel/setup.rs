@@ -4,6 +4,7 @@ use super::profile::PanelProfile;
 use super::wavefront::Wavefront;
 use crate::error::{Error, Result};
 use crate::field::Grid;
+use crate::field::grid::light;
 use crate::points::colour::Lasers;
 use crate::units::show_length;
 
@@ -50,6 +51,7 @@ impl Setup {
     /// As [`PanelProfile::grid`].
     pub fn new(profile: PanelProfile, wavelength: Option<f64>) -> Result<Self> {
         let (grid, wavelength) = (profile.grid()?, wavelength.unwrap_or(profile.default_wavelength()));
+        light(wavelength)?;
         Ok(Self { profile, grid, wavelength, lasers: None, correction: Correction::Profile })
     }
 

@@ -46,6 +46,8 @@ pub fn export(folder: &Path, format: Format, frames: &Frames, output: &Path, pro
         (None, None) if format.is_mask() => None,
         (None, None) => reader.plate().printer.as_ref().and_then(|printer| printer.field),
     };
+    // A plate that fits one exposure is one.
+    let size = size.or((!format.is_mask() && width * height <= MOST).then_some([width, height]));
     match size {
         Some(size) => write_frames(&mut reader, frames, size, output, format, progress),
         None if format.is_mask() => {
@@ -55,7 +57,10 @@ pub fn export(folder: &Path, format: Format, frames: &Frames, output: &Path, pro
             let bytes = mask::write(&mut reader, format, [0; 2], size, output, progress)?;
             Ok(Exported { files: 1, bytes })
         }
-        None => Err(Error::parameter("frame", "give the size of an exposure, --frame 1920x1080, or --band 2048")),
+        None => {
+            let what = "the plate is too large for one picture: give the size of an exposure, --frame 1920x1080, or --band 2048";
+            Err(Error::parameter("frame", what))
+        }
     }
 }
 
@@ -124,9 +129,11 @@ fn write_frames(
             let extension = if format == Format::Oasis { "oas" } else { format.name() };
             let name = format!("frame-{down:05}-{across:05}.{extension}");
             let path = output.join(&name);
+            // What a panel or printer exposes is of one size where that was asked for; all else ends with the plate.
+            let inside = [width.min(file_width - column), height.min(file_height - row)];
+            let frame = if frames.size.is_some() { frame } else { inside };
             written.files += 1;
             written.bytes += if format.is_mask() {
-                let inside = [width.min(file_width - column), height.min(file_height - row)];
                 mask::write(reader, format, [column, row], inside, &path, progress)?
             } else {
                 let mut levels = reader.rectangle([column, row], frame)?;
@@ -147,8 +154,8 @@ fn write_frames(
                 file: name,
                 column,
                 row,
-                x: middle(column, width, size[0]) * pitch_x,
-                y: -middle(row, height, size[1]) * pitch_y,
+                x: middle(column, frame[0], size[0]) * pitch_x,
+                y: -middle(row, frame[1], size[1]) * pitch_y,
             });
             progress.advance(1);
         }

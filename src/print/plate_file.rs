@@ -159,8 +159,8 @@ impl Plate {
         let mut segment = file.segment.unwrap_or(1024.min(tile));
         let mut layout =
             FileLayout { mirror: file.mirror, rotation: file.rotation, guard: file.guard, marks: file.marks, tile };
-        if asked.size.is_some() {
-            // A plate that is made smaller than its file says gets tiles that fit.
+        if asked.size.is_some() || file.tile.is_none() {
+            // A plate that is made smaller than its file says, or whose file says no tiles, gets some that fit.
             layout.tile = tile.min(width.min(height) / 64 * 64).max(64);
             segment = segment.min(layout.tile);
         }
@@ -189,7 +189,7 @@ impl Plate {
             }
         };
         let scene = &file.scene;
-        let wavelength = at.read("wavelength", &file.wavelength, units::positive_length)?;
+        let wavelength = at.read("wavelength", &file.wavelength, units::wavelength)?;
         let viewer = at.read("scene.viewer", &scene.viewer, units::positive_length)?;
         let resolution = scene.resolution.as_deref().unwrap_or("0.016666666666666666deg");
         let resolution = at.angle("scene.resolution", resolution)?;
@@ -209,7 +209,7 @@ impl Plate {
                     None => vec![wavelength],
                     Some(texts) => texts
                         .iter()
-                        .map(|text| at.read("slit.wavelengths", text, units::positive_length))
+                        .map(|text| at.read("slit.wavelengths", text, units::wavelength))
                         .collect::<Result<Vec<_>>>()?,
                 };
                 if !matches!(wavelengths.len(), 1 | 3) || wavelengths[0] != wavelength {

@@ -38,6 +38,11 @@ pub(super) fn text_of(name: &str) -> Result<String> {
 }
 
 impl Plate {
+    /// The TOML of an embedded profile, as it stands in `calib/`: what one's own begins with.
+    pub fn embedded_text(name: &str) -> Option<&'static str> {
+        PLATES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+    }
+
     /// A built-in plate by name, or else the TOML file at that path, with what is asked in place of its own.
     ///
     /// # Errors

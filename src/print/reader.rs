@@ -2,10 +2,10 @@
 
 use super::folder::open;
 use super::geometry::file_raster;
-use super::manifest::Manifest;
+use super::manifest::{Manifest, sha256};
 use super::plate::{Plate, Raster};
 use super::tiff::{Layout, read_at, unpacked};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::fs::File;
@@ -53,12 +53,16 @@ impl Reader {
     /// The levels of a tile as the file shows it.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Input`] for one whose bytes are not those that were computed; [`Error::Io`].
     pub fn tile(&mut self, index: u64) -> Result<Arc<Vec<u8>>> {
         if let Some((_, levels)) = self.kept.iter().find(|(kept, _)| *kept == index) {
             return Ok(Arc::clone(levels));
         }
         let bytes = read_at(&self.file, &self.path, self.layout.offset(index), self.layout.tile_bytes)?;
+        if self.manifest.tiles.as_ref().is_some_and(|tiles| tiles.get(index as usize) != Some(&sha256(&bytes))) {
+            let what = format!("tile {index} is not as it was computed; give the print command again to redo it");
+            return Err(Error::input(&self.path, what));
+        }
         let levels = Arc::new(unpacked(&bytes, self.plate().fringe.bits));
         while (self.kept.len() + 1) * levels.len() > KEPT && !self.kept.is_empty() {
             self.kept.pop_front();
@@ -69,7 +73,7 @@ impl Reader {
     /// Levels of a rectangle of the file; what lies beyond its edge is 0.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// As [`Reader::tile`].
     pub fn rectangle(&mut self, [column, row]: [u64; 2], [width, height]: [u64; 2]) -> Result<Vec<u8>> {
         let tile = self.plate().file.tile;
         let Raster { width: file_width, height: file_height, .. } = self.raster();

@@ -11,6 +11,7 @@ use super::{folder, geometry};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::names::Named;
+use crate::progress::Progress;
 use crate::units::{show_length, show_pitch};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -178,7 +179,7 @@ fn checks(plate: &Plate, folder: &Path) -> Vec<String> {
         .collect();
     let from = if from.is_empty() { "straight on".to_owned() } else { from.join(" and ") };
     list.push(format!(
-        "The lamp shines {from}, as the viewer sees it. From {} the picture below is seen upright; if it stands on its head or far away \
+        "The lamp shines {from}, as the viewer sees it. From {} the picture above is seen upright; if it stands on its head or far away \
          from where it should be, turn the plate round.",
         show_length(plate.view.viewer)
     ));
@@ -189,8 +190,10 @@ fn checks(plate: &Plate, folder: &Path) -> Vec<String> {
 /// Writes the job sheet of a plate's folder, with a view of it.
 ///
 /// # Errors
-/// Those of a plate that is missing or incomplete; [`Error::Io`].
-pub fn write_sheet(folder: &Path, view: &PlateView, white: f32, path: &Path) -> Result<()> {
+/// Those of a plate that is missing, incomplete or not as it was computed; [`Error::Io`].
+pub fn write_sheet(folder: &Path, view: &PlateView, white: f32, path: &Path, progress: &Progress) -> Result<()> {
+    // The hashes on the page are said to be those of whole files.
+    folder::verify(folder, progress)?;
     let manifest = Manifest::of(folder)?;
     let settings = &manifest.settings;
     let plate = &settings.plate;

@@ -52,6 +52,10 @@ use crate::progress::Progress;
 use crate::propagation::{Aperture, Propagator, Settings};
 use glam::DVec2;
 
+/// Pixels of a picture, and samples of the plane in focus, at most: some gigabytes of memory.
+const MOST_PIXELS: usize = 1 << 28;
+const MOST_SAMPLES: f64 = (1u64 << 30) as f64;
+
 /// From where and at what depth the field is looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum View {
@@ -93,6 +97,12 @@ impl View {
             _ => half,
         }
     }
+}
+
+/// The greatest rectangle inside of ±`half` [m], about its middle, that a picture of `width × height` pixels fills with square ones.
+pub fn square_half(half: DVec2, (width, height): (usize, usize)) -> DVec2 {
+    let pixels = DVec2::new(width.max(1) as f64, height.max(1) as f64);
+    pixels * (half / pixels).min_element()
 }
 
 /// Planes to look at, with their names, where no more is known than the range of depths z [m].
@@ -197,7 +207,8 @@ fn cells(half: f64, pitch: f64) -> f64 {
 fn window(field: &Grid, half: DVec2) -> Result<Grid> {
     let (width, height) = (cells(half.x, field.pitch_x), cells(half.y, field.pitch_y));
     // 2²⁰ samples a side are metres of plane: a window beyond is a slip in a unit.
-    if !(width >= 1.0 && height >= 1.0 && width <= (1 << 20) as f64 && height <= (1 << 20) as f64) {
+    let most = (1 << 20) as f64;
+    if !(width >= 1.0 && height >= 1.0 && width.max(height) <= most && width * height <= MOST_SAMPLES) {
         let size = format_args!("half size {} × {} m", half.x, half.y);
         return Err(Error::out_of_range("window", size, "cannot be sampled"));
     }
@@ -213,6 +224,10 @@ pub fn picture(
     settings: &ViewSettings,
     progress: &Progress,
 ) -> Result<Picture> {
+    if width.saturating_mul(height) > MOST_PIXELS {
+        let what = format!("{width}×{height}");
+        return Err(Error::out_of_range("size", what, format!("has too many pixels: {MOST_PIXELS} at most")));
+    }
     let (grid, values) = intensity(field, view, half, settings, progress)?;
     Ok(Picture::from_samples(&grid, &values, half, width, height))
 }

@@ -252,6 +252,9 @@ class SLM:
 
     def _send(self, array: Any, request: dict[str, Any]) -> dict[str, Any]:
         """Puts an array into the shared memory and asks for what is to be done with it."""
+        made_for = getattr(array, "wavelength", None)
+        if made_for is not None and abs(made_for - self.wavelength) > 1e-6 * self.wavelength:
+            raise ValueError("the frame is for %g nm, the panel is served at %g nm" % (1e9 * made_for, 1e9 * self.wavelength))
         array = np.asarray(array)
         if array.shape != self.shape:
             raise ValueError("the array is %s, the panel %s (rows, columns)" % (array.shape, self.shape))

@@ -15,6 +15,7 @@ pub(crate) const CASES: &[Case] = &[
     ("unplugging_is_waited_out_where_asked", replugged),
     ("no_screen_saver_comes_while_a_frame_is_shown", awake),
     ("escape_in_the_window_ends_the_show", escape),
+    ("a_second_program_is_refused_the_panel_and_another_monitor_is_free", second),
 ];
 
 fn job() -> ShowJob {
@@ -25,6 +26,22 @@ fn start(desk: &Desk, job: &ShowJob) -> Running {
     let running = Running::start(Some(desk.display()), &Job::Show(job.clone()), &[]);
     desk.wait_for(&desk.plug(PANEL), &job.picture());
     running
+}
+
+/// Of two windows over each other one would not be on the panel, whatever its program says.
+fn second(desk: &Desk) -> Ended {
+    let (plug, job) = (desk.plug(PANEL), job());
+    let first = start(desk, &job);
+    let other = ShowJob { pattern: Pattern::Random(6), hold: Some(0.1), ..job.clone() };
+    let refused =
+        Running::start(Some(desk.display()), &Job::Show(other.clone()), &[]).end().expect_err("a second window");
+    assert!(refused.contains("another holodrive"), "{refused}");
+    assert!(desk.capture_monitor(&plug) == job.picture(), "the first frame was touched");
+    let operator = ShowJob { monitor: OPERATOR.into(), exact: false, ..other.clone() };
+    Running::start(Some(desk.display()), &Job::Show(operator), &[]).end().expect("another monitor is free");
+    first.stop().expect("report");
+    Running::start(Some(desk.display()), &Job::Show(other), &[]).end().expect("free again");
+    Ended::Passed
 }
 
 fn cursor(desk: &Desk) -> Ended {

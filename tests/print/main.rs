@@ -362,12 +362,33 @@ fn independent_readers_see_the_same_levels() {
     done(f, &[&window[..], &["window"]].concat());
     done(f, &["print", "export", "bits", "--as", "gds", "-o", "bits.gds"]);
     refused(f, &["print", "export", "gray", "--as", "gds", "-o", "gray.gds"], "8 bits");
-    refused(f, &["print", "export", "bits", "--as", "png", "-o", "frames"], "--frame");
+    // Whole, and in bands of which the last is as high as what is left.
+    done(f, &["print", "export", "bits", "--as", "png", "-o", "bits-whole"]);
+    done(f, &["print", "export", "gray", "--as", "bmp", "--band", "250", "-o", "gray-bands"]);
     refused(
         f,
         &["print", "export", "bits", "--as", "bmp", "--frame", "64x64", "--overlap", "40", "-o", "x"],
         "half of a frame",
     );
+    // Bytes that are not those that were computed go no further.
+    done(f, &["print", "export", "gray", "--as", "zarr", "-o", "whole.zarr"]);
+    fs::create_dir(f.join("torn")).expect("folder");
+    for name in ["plate.tif", "manifest.json"] {
+        fs::copy(f.join("gray").join(name), f.join("torn").join(name)).expect("copy");
+    }
+    let mut bytes = fs::read(f.join("torn/plate.tif")).expect("plate");
+    let middle = bytes.len() / 2;
+    bytes[middle..middle + 64].iter_mut().for_each(|byte| *byte ^= 0x55);
+    fs::write(f.join("torn/plate.tif"), bytes).expect("torn");
+    for format in ["png", "bmp"] {
+        refused(
+            f,
+            &["print", "export", "torn", "--as", format, "-o", &format!("torn-{format}")],
+            "not as it was computed",
+        );
+    }
+    refused(f, &["print", "sheet", "torn", "-o", "torn.html"], "as it was computed");
+    refused(f, &["print", "preview", "gray", "-o", "seen.jpg"], ".png");
     // The levels, by this test's own reading of the layout: tags 324 and 325.
     let numbers = |name: &str, bits: usize| {
         let bytes = fs::read(f.join(name).join("plate.tif")).expect("plate");
@@ -444,6 +465,10 @@ fn independent_readers_see_the_same_levels() {
              got[r:r + y, c:c + x] = a[:y, :x]; seen[r:r + y, c:c + x] = True\n        \
              assert seen.all() and (got == raw[n]).all(), folder\n        \
              assert abs(im.info['dpi'][0] - 25400) < 1, im.info\n\
+             whole = np.array(Image.open('bits-whole/frame-00000-00000.png')).astype(np.uint8)\n\
+             assert whole.shape == (600, 860) and ((whole > 0) == raw['bits']).all()\n\
+             bands = [np.array(Image.open(f'gray-bands/frame-0000{{k}}-00000.bmp')) for k in range(3)]\n\
+             assert [b.shape[0] for b in bands] == [250, 250, 100] and (np.concatenate(bands) == raw['gray']).all()\n\
              order = [e['column'] for e in json.load(open('gray-png/frames.json'))['exposures']]\n\
              assert order[:6] == sorted(order[:3]) + sorted(order[:3])[::-1], order\n\
              total = np.zeros((600 + 200, 860 + 320))\nlisted = json.load(open('window/frames.json'))\n\

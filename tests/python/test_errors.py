@@ -60,7 +60,7 @@ def test_an_encoding_that_is_not_known_names_the_nearest(panel: hd.Panel) -> Non
 def test_a_file_that_is_not_there_is_an_os_error_with_its_number(tmp_path: Path) -> None:
     with pytest.raises(OSError) as caught:
         hd.Frame.load(tmp_path / "none.png")
-    assert isinstance(caught.value, hd.FileError)
+    assert isinstance(caught.value, hd.FileError) and isinstance(caught.value, FileNotFoundError)
     assert caught.value.errno == 2 and Path(caught.value.filename) == tmp_path / "none.png"
     assert "none.png" in str(caught.value) and not str(caught.value).startswith("[Errno")
 

@@ -85,6 +85,7 @@ pub fn photo_file(folder: &Path, name: &str) -> Result<PathBuf> {
     let mut there = all.iter().filter(|path| path.exists());
     match (there.next(), there.next()) {
         (Some(path), None) => Ok(path.clone()),
+        (None, _) if !folder.is_dir() => Err(Error::input(folder, "there is no such folder of photos")),
         (None, _) => Err(Error::input(folder, format!("no photo {name}.npy, .png, .tif or .bmp"))),
         (Some(one), Some(_)) => Err(Error::input(one, format!("one of several files named {name}; keep one"))),
     }

@@ -12,7 +12,7 @@ pub(crate) struct PanelArgs {
     #[arg(long, default_value = "generic", value_name = "PROFILE")]
     pub(crate) panel: String,
     /// Vacuum wavelength, with its unit [default: the panel's first].
-    #[arg(long, value_parser = units::positive_length, value_name = "LENGTH")]
+    #[arg(long, value_parser = units::wavelength, value_name = "LENGTH")]
     pub(crate) wavelength: Option<f64>,
     /// Let the profile run its [command]s before and after frames are on a monitor.
     #[arg(hide_short_help = true, long)]

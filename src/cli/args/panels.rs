@@ -5,14 +5,20 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct PanelsArgs {
-    /// Also write the list to this file, as JSON.
+    /// One of them: shows its TOML, which your own profile can begin with.
+    #[arg(value_name = "NAME")]
+    pub(crate) name: Option<String>,
+    /// Also write the list to this file, as JSON; with NAME its TOML.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct PlatesArgs {
-    /// Also write the list to this file, as JSON.
+    /// One of them: shows its TOML, which your own profile can begin with.
+    #[arg(value_name = "NAME")]
+    pub(crate) name: Option<String>,
+    /// Also write the list to this file, as JSON; with NAME its TOML.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
 }

@@ -114,7 +114,7 @@ pub(crate) enum Wavelengths {
 pub(super) fn wavelengths(text: &str) -> Result<Wavelengths, String> {
     match text {
         "panel" => Ok(Wavelengths::Panel),
-        _ => three(text, units::positive_length, "three wavelengths such as 638nm,520nm,450nm").map(Wavelengths::Of),
+        _ => three(text, units::wavelength, "three wavelengths such as 638nm,520nm,450nm").map(Wavelengths::Of),
     }
 }
 

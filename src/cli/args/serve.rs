@@ -42,6 +42,9 @@ pub(crate) struct ServeArgs {
     /// Memory for the frames that clients preload.
     #[arg(hide_short_help = true, help_heading = "Protocols", long, value_parser = units::memory, default_value = "2GB", value_name = "SIZE")]
     pub(crate) preload: u64,
+    /// End, as by Ctrl-C, when standard input does: for a program that keeps this one in the background.
+    #[arg(hide_short_help = true, help_heading = "Protocols", long)]
+    pub(crate) until_stdin_closes: bool,
     /// Address to listen on. Other machines may then write on the panel: neither protocol asks who sends.
     #[arg(help_heading = "Protocols", long, default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), value_name = "ADDRESS")]
     pub(crate) listen: IpAddr,

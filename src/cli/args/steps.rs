@@ -101,7 +101,7 @@ pub(crate) struct PropagateArgs {
     #[arg(help_heading = "Panel", long, value_parser = lengths, value_name = "LENGTH[,LENGTH]")]
     pub(crate) pitch: Option<[f64; 2]>,
     /// Vacuum wavelength [default: what stands beside the field].
-    #[arg(help_heading = "Panel", long, value_parser = units::positive_length, value_name = "LENGTH")]
+    #[arg(help_heading = "Panel", long, value_parser = units::wavelength, value_name = "LENGTH")]
     pub(crate) wavelength: Option<f64>,
     /// Wave equation.
     #[arg(long, value_parser = one_of::<Kernel>(), default_value = "angular-spectrum", value_name = "NAME")]
@@ -204,11 +204,11 @@ pub(crate) struct ReconstructArgs {
     /// The picture to write: .png (8 bit, sRGB-coded) or .npy (H×W float32, linear intensity).
     #[arg(short, long, default_value = "picture.png", value_name = "FILE")]
     pub(crate) output: PathBuf,
-    /// Panel profile [default: what the file says, else generic].
+    /// Panel profile [default: what the file says; a picture that says nothing needs it].
     #[arg(help_heading = "Panel", long, value_name = "PROFILE")]
     pub(crate) panel: Option<String>,
     /// Vacuum wavelength [default: what the file says, else the panel's].
-    #[arg(help_heading = "Panel", long, value_parser = units::positive_length, value_name = "LENGTH")]
+    #[arg(help_heading = "Panel", long, value_parser = units::wavelength, value_name = "LENGTH")]
     pub(crate) wavelength: Option<f64>,
     /// Plane in focus: negative behind the panel, positive in front.
     #[arg(
@@ -230,7 +230,8 @@ pub(crate) struct ReconstructArgs {
     /// Diameter of the eye's pupil.
     #[arg(help_heading = "View", long, requires = "eye", default_value = "4mm", value_parser = units::positive_length, value_name = "LENGTH")]
     pub(crate) pupil: f64,
-    /// Pixels of the picture [default: one for each sample of the field].
+    /// Pixels of the picture, which are square: what is too wide or too high for them is cut off, or see --half [default: one for
+    /// each sample of the field].
     #[arg(help_heading = "Picture", long, value_parser = size, value_name = "WxH")]
     pub(crate) size: Option<(usize, usize)>,
     /// Half width and half height of the view on the plane in focus [default: the panel's, widened as the eye sees it].

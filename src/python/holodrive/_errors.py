@@ -13,6 +13,7 @@ __all__ = [
     "InputError",
     "Interrupted",
     "MemoryBudgetError",
+    "MissingFileError",
     "OutOfRangeError",
     "ParameterError",
     "UndersampledError",
@@ -80,6 +81,10 @@ class FileError(Error, OSError):
     def __str__(self) -> str:
         # OSError's own would put its number before the library's words.
         return str(self.args[0])
+
+
+class MissingFileError(FileError, FileNotFoundError):
+    """There is no such file or folder."""
 
 
 class Interrupted(Error, KeyboardInterrupt):

@@ -12,6 +12,8 @@ Watcher = Callable[[Optional[str], int, int], None]
 
 def watcher(given: Any) -> Watcher:
     """What the library calls for a ``progress`` argument."""
+    if given is False:
+        return _of_callable(lambda step, done, total: None)
     if given is True:
         from tqdm.auto import tqdm  # type: ignore[import-untyped,unused-ignore]
 
@@ -43,8 +45,16 @@ def _of_bar(bar: Any, own: bool) -> Watcher:
             shown[0] = step
             if hasattr(bar, "set_description"):
                 bar.set_description(step, refresh=False)
+            # Each step has its own time and rate.
+            if hasattr(bar, "reset"):
+                bar.reset(total or None)
+            else:
+                bar.n = 0
         bar.total = total or None
-        bar.n = min(done, total) if total else done
-        bar.refresh()
+        done = min(done, total) if total else done
+        # The bar's own `update` keeps to its `mininterval`; the last look is shown whenever it comes.
+        bar.update(done - bar.n)
+        if total and done == total:
+            bar.refresh()
 
     return told

@@ -196,6 +196,7 @@ pub(crate) fn encode<'py>(
     let encode_field = |source: &Bound<'py, PyAny>, setup: &Setup| -> PyResult<Frame> {
         let given = Given::on_panel(source, setup)?;
         let (field, content, are_phases) = given.get();
+        content.on_panel().raise(py)?;
         let usual = if are_phases { Encoding::Kinoform } else { Encoding::usual(setup.profile.modulation()) };
         let chosen = asked.encoding(py, usual)?;
         if let Encoding::View(_) = chosen {

@@ -2,6 +2,7 @@
 
 use holodrive::Error;
 use pyo3::prelude::*;
+use std::path::Path;
 
 /// The exception of an error: its class, and what it holds for programs.
 fn exception<'py>(py: Python<'py>, error: &Error) -> PyResult<Bound<'py, PyAny>> {
@@ -14,6 +15,7 @@ fn exception<'py>(py: Python<'py>, error: &Error) -> PyResult<Bound<'py, PyAny>>
         Error::Unsupported { .. } => "UnsupportedError",
         Error::Memory { .. } => "MemoryBudgetError",
         Error::Display { .. } => "DisplayError",
+        Error::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound => "MissingFileError",
         Error::Io { .. } => "FileError",
         Error::Interrupted => "Interrupted",
         _ => "Error",
@@ -56,6 +58,16 @@ impl<T> Raise<T> for holodrive::Result<T> {
     fn raise(self, py: Python<'_>) -> PyResult<T> {
         self.map_err(|error| raised(py, &error))
     }
+}
+
+/// Refuses a file whose ending is none of these: it would not be what its name says.
+pub(crate) fn ends_with(py: Python<'_>, path: &Path, kinds: &[&str]) -> PyResult<()> {
+    let own = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+    if kinds.contains(&own.as_str()) {
+        return Ok(());
+    }
+    let all = kinds.iter().map(|kind| format!(".{kind}")).collect::<Vec<_>>().join(", ");
+    Err(raised(py, &Error::input(path, format!("is written as {all}"))))
 }
 
 /// Refuses an argument.

@@ -1,13 +1,13 @@
 //! Frames of drive levels.
 
 use crate::arrays::{Kind, array, as_asked, handed, kind, lent, plane, rows, shown};
-use crate::errors::{Raise, refused};
+use crate::errors::{Raise, ends_with, refused};
 use crate::panel::Panel;
 use crate::run::run;
 use holodrive::encode::{EncodeReport, Encoded};
 use holodrive::panel::Setup;
 use holodrive::units::show_length;
-use numpy::PyArrayMethods;
+use numpy::{PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -72,7 +72,8 @@ impl Frame {
             return refused(py, "levels", what);
         }
         if kind(&levels, "levels")? != Kind::Whole {
-            let what = format!("an array of {:?}; levels are whole numbers (encode takes phases and fields)", levels);
+            let of = levels.dtype();
+            let what = format!("an array of {of}; levels are whole numbers (encode takes phases and fields)");
             return refused(py, "levels", what);
         }
         let wide = rows::<i64>(&levels)?.to_vec()?;
@@ -103,6 +104,7 @@ impl Frame {
 
     /// Writes the frame as a gray PNG that holds its metadata: `holodrive show` puts it on the panel, `reconstruct` looks at it.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        ends_with(py, &path, &["png"])?;
         let frame = &self.frame;
         run(py, None, |_| frame.write(&path))
     }

@@ -112,9 +112,6 @@ impl Panel {
             None => numbers.profile(py, wavelength)?,
         };
         let setup = Setup::new(profile, wavelength.map(|wavelength| wavelength.0)).raise(py)?;
-        if !(setup.wavelength > 0.0 && setup.wavelength.is_finite()) {
-            return refused(py, "wavelength", format!("{} m must be greater than zero", setup.wavelength));
-        }
         let correction = match correction {
             None => Correction::Profile,
             Some(none) if none.as_os_str() == "none" => Correction::None,

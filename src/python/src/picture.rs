@@ -1,6 +1,7 @@
 //! Pictures of light.
 
 use crate::arrays::{as_asked, handed, lent};
+use crate::errors::{ends_with, refused};
 use crate::run::run;
 use glam::DVec2;
 use holodrive::reconstruction::{Reconstruction, Scale, View};
@@ -76,7 +77,8 @@ impl Picture {
     #[pyo3(signature = (white = None))]
     fn coded<'py>(&self, py: Python<'py>, white: Option<f32>) -> PyResult<Bound<'py, PyArray2<u8>>> {
         let picture = &self.picture;
-        let codes = py.detach(|| picture.coded(scale(white)).iter().map(|v| (v * 255.0).round() as u8).collect());
+        let scale = scale(py, white)?;
+        let codes = py.detach(|| picture.coded(scale).iter().map(|v| (v * 255.0).round() as u8).collect());
         handed(py, (picture.height, picture.width), codes)
     }
 
@@ -86,9 +88,11 @@ impl Picture {
     /// :param white: as in :meth:`coded`.
     #[pyo3(signature = (path, white = None))]
     fn save(&self, py: Python<'_>, path: PathBuf, white: Option<f32>) -> PyResult<()> {
+        ends_with(py, &path, &["png", "npy", "mat", "h5", "hdf5", "tif", "tiff"])?;
         let Self { picture, view, half } = self;
+        let scale = scale(py, white)?;
         run(py, None, |_| {
-            let white = picture.white(scale(white));
+            let white = picture.white(scale);
             Reconstruction::Gray(picture.clone()).write(&path, None, white, view, *half)
         })
     }
@@ -112,6 +116,10 @@ impl Picture {
     }
 }
 
-fn scale(white: Option<f32>) -> Scale {
-    white.map_or(Scale::Percentile(0.995), Scale::White)
+fn scale(py: Python<'_>, white: Option<f32>) -> PyResult<Scale> {
+    match white {
+        None => Ok(Scale::Percentile(0.995)),
+        Some(white) if white > 0.0 && white.is_finite() => Ok(Scale::White(white)),
+        Some(white) => refused(py, "white", format!("{white} must be greater than zero")),
+    }
 }

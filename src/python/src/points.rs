@@ -1,7 +1,7 @@
 //! Point sources between Python's arrays and the library's clouds.
 
 use crate::arrays::{array, handed, shown, values};
-use crate::errors::refused;
+use crate::errors::{ends_with, refused};
 use crate::run::run;
 use glam::DVec3;
 use holodrive::field::npy::Content;
@@ -136,6 +136,7 @@ impl Points {
 
     /// Writes the points as binary .ply: double x y z, float amplitude (or amplitude_r, _g, _b), double phase.
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        ends_with(py, &path, &["ply"])?;
         let (cloud, content) = (self.cloud(), self.content());
         let made = ply::Metadata {
             scene: self.origin.clone(),

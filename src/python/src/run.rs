@@ -4,7 +4,7 @@ use crate::errors::raised;
 use holodrive::Result;
 use holodrive::progress::Progress;
 use pyo3::prelude::*;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
@@ -38,6 +38,22 @@ fn look(py: Python<'_>, watcher: Option<&Py<PyAny>>, progress: &Progress) -> PyR
     Ok(())
 }
 
+/// The process in which the library's threads are; 0 before the first call.
+static OWNER: AtomicU32 = AtomicU32::new(0);
+
+/// Refuses to wait for threads that a fork has left behind.
+fn of_this_process(py: Python<'_>) -> PyResult<()> {
+    let own = std::process::id();
+    match OWNER.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {
+        Err(owner) if owner != own => {
+            let what = "this process was forked from one in which holodrive had worked, and has none of its threads: start processes \
+                        by \"spawn\" (multiprocessing.get_context(\"spawn\"), or DataLoader's multiprocessing_context)";
+            Err(raised(py, &holodrive::Error::unsupported(what)))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Does `work` on a thread of its own with the interpreter's lock released. Its progress is told to `given` (a callable, a tqdm
 /// bar, `True`); an exception that comes meanwhile, Ctrl-C's or the callable's, stops it and is raised.
 pub(crate) fn run<T: Send>(
@@ -45,6 +61,7 @@ pub(crate) fn run<T: Send>(
     given: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Progress) -> Result<T> + Send,
 ) -> PyResult<T> {
+    of_this_process(py)?;
     let watcher = given.filter(|given| !given.is_none()).map(watcher).transpose()?;
     let watcher = watcher.as_ref();
     let progress = &Progress::new();

@@ -94,7 +94,10 @@ pub(crate) fn reconstruct(
                settings: &ViewSettings,
                eye: Option<[f64; 3]>,
                progress: &Progress| {
-        let half = window.unwrap_or_else(|| view.seen_half(&field.grid, eye));
+        let half = window.unwrap_or_else(|| {
+            let half = view.seen_half(&field.grid, eye);
+            size.map_or(half, |size| reconstruction::square_half(half, size))
+        });
         progress.start("reconstruct", 0);
         let picture = match size {
             Some(size) => reconstruction::picture(field, &view, half, size, settings, progress)?,
@@ -156,6 +159,9 @@ pub(crate) fn judge(
             frames.try_iter()?.map(|frame| frame?.cast_into::<Frame>().map_err(PyErr::from)).collect::<PyResult<_>>()?
         }
     };
+    if looks == 0 {
+        return refused(py, "looks", "0 make no figures; take one at least");
+    }
     let Some(first) = frames.first() else {
         return refused(py, "frames", "there are none");
     };

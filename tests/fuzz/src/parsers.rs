@@ -97,7 +97,7 @@ fn table(folder: &Path, name: &str) -> Said {
     match name {
         "hamamatsu.lut" => said(vendor::hamamatsu_lut(&path, 256)),
         "meadowlark.lut" => said(vendor::meadowlark_lut(&path)),
-        "powers.csv" => said(read_powers(&path, 256)),
+        "powers.csv" => said(read_powers(&path, 256, 532e-9)),
         _ => said(Wavefront::read(&path, Some(532e-9))),
     }
 }
