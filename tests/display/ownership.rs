@@ -37,7 +37,7 @@ fn second(desk: &Desk) -> Ended {
         Running::start(Some(desk.display()), &Job::Show(other.clone()), &[]).end().expect_err("a second window");
     assert!(refused.contains("another holodrive"), "{refused}");
     assert!(desk.capture_monitor(&plug) == job.picture(), "the first frame was touched");
-    let operator = ShowJob { monitor: OPERATOR.into(), exact: false, ..other.clone() };
+    let operator = ShowJob { monitor: OPERATOR.into(), width: 1280, height: 720, exact: false, ..other.clone() };
     Running::start(Some(desk.display()), &Job::Show(operator), &[]).end().expect("another monitor is free");
     first.stop().expect("report");
     Running::start(Some(desk.display()), &Job::Show(other), &[]).end().expect("free again");

@@ -13,7 +13,7 @@ from conftest import ROOT
 
 def test_every_error_is_an_error() -> None:
     classes = [value for value in vars(hd).values() if isinstance(value, type) and issubclass(value, Exception)]
-    assert len(classes) == 10 and all(issubclass(one, hd.Error) for one in classes)
+    assert len(classes) == 11 and all(issubclass(one, hd.Error) for one in classes)
     assert issubclass(hd.ParameterError, ValueError) and issubclass(hd.InputError, ValueError)
     assert issubclass(hd.FileError, OSError) and issubclass(hd.UnsupportedError, NotImplementedError)
     assert issubclass(hd.MemoryBudgetError, MemoryError)
