@@ -64,11 +64,10 @@ impl Drop for Ready {
     }
 }
 
+/// A line with the laser's wavelength in nm, in as few digits as say it to a femtometre.
 fn filled(line: &str, wavelength: f64) -> String {
-    line.replace(
-        "{wavelength}",
-        &format!("{:.6}", wavelength * 1e9).trim_end_matches('0').trim_end_matches('.').to_string(),
-    )
+    let digits = format!("{:.6}", wavelength * 1e9);
+    line.replace("{wavelength}", digits.trim_end_matches('0').trim_end_matches('.'))
 }
 
 fn folder(profile: &PanelProfile) -> PathBuf {

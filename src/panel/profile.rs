@@ -57,7 +57,7 @@ pub struct CorrectionFile {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PanelCommands {
-    /// Run before the first frame is shown; `{wavelength}` stands for the vacuum wavelength in nm, `{name}` for the panel's name.
+    /// Run before the first frame is shown; `{wavelength}` stands for the vacuum wavelength in nm.
     pub before: Option<String>,
     /// Run after the last one.
     pub after: Option<String>,

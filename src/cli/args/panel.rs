@@ -16,6 +16,7 @@ pub(crate) struct PanelArgs {
     pub(crate) wavelength: Option<f64>,
     /// Let the profile run its [command]s before and after frames are on a monitor.
     #[arg(hide_short_help = true, long)]
+    #[cfg_attr(not(feature = "display"), allow(dead_code))] // Without monitors there is nothing to run them for.
     pub(crate) allow_command: bool,
 }
 
