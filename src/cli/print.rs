@@ -123,10 +123,7 @@ fn compute(settings: PrintSettings, json: bool) -> Result<Report> {
         done.finished,
         done.tiles
     ));
-    if work.inexact > 0 {
-        let (fields, bound) = (work.inexact, work.error_bound);
-        report.warn([format!("{fields} fields of segments may err by more than was asked, by {bound:.1e} at most")]);
-    }
+    report.warn(work.warning());
     if done.computed > 0 {
         let line = format!(
             "rate         {:.2e} pixels/s; field {:.2e} point-pixel pairs/s; rays {}, field {}, fringe {}",

@@ -41,10 +41,7 @@ pub(super) fn compute(
     let depths = object.depths();
     let seen = ObjectWave::new(plane, object).whole(progress)?;
     let work = &seen.work;
-    if work.inexact > 0 {
-        let (fields, bound) = (work.inexact, work.error_bound);
-        report.warn([format!("{fields} fields of segments may err by more than was asked, by {bound:.1e} at most")]);
-    }
+    report.warn(work.warning());
     report.add_serialised(
         "views",
         work,

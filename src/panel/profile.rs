@@ -119,6 +119,9 @@ pub struct PanelProfile {
     /// What the panel's second channel is sent, where it has one.
     #[serde(default)]
     pub command: Option<PanelCommands>,
+    /// What has to be so at the device for the profile to hold; told wherever it is used.
+    #[serde(default)]
+    pub note: Option<String>,
     /// Keys whose values come from memory or one secondary source.
     pub unverified: Vec<String>,
 }
@@ -191,6 +194,7 @@ impl PanelProfile {
             beam: None,
             corrections: Vec::new(),
             command: None,
+            note: None,
             unverified: Vec::new(),
         };
         profile.check().map_err(|what| Error::parameter("panel", what))?;
@@ -200,10 +204,9 @@ impl PanelProfile {
     /// What a user should know before trusting the profile: one line a fact that nobody has checked.
     pub fn warnings(&self) -> Vec<String> {
         let unchecked = self.unverified.join(", ");
-        if unchecked.is_empty() {
-            return Vec::new();
-        }
-        vec![format!("panel {}: not verified: {unchecked}; check against your device's data sheet", self.name)]
+        let unchecked = (!unchecked.is_empty())
+            .then(|| format!("not verified: {unchecked}; check against your device's data sheet"));
+        self.note.iter().chain(&unchecked).map(|what| format!("panel {}: {what}", self.name)).collect()
     }
 
     /// Number of drive levels.

@@ -101,6 +101,7 @@ fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
         "settle_time",
         "refresh",
         "edid",
+        "note",
         "command",
         "signal",
         "correction",
@@ -146,6 +147,7 @@ fn parse(text: &str, source: &Path) -> Result<PanelProfile> {
         edid: file.edid,
         corrections,
         command: file.command,
+        note: file.note,
         crosstalk: file.crosstalk,
         unmodulated: at.within("unmodulated", file.unmodulated, 0.0..=1.0)?,
         beam: file.beam.map(|path| at.beside(&path)),
@@ -312,6 +314,7 @@ mod tests {
         profile.crosstalk = 0.35;
         profile.unmodulated = 0.07;
         profile.beam = Some("beam.npy".into());
+        profile.note = Some("with the \"VIS\" table loaded".into());
         profile.command = Some(PanelCommands { before: Some("slmctl on --port 'COM 3'".into()), after: None });
         profile.corrections = vec![CorrectionFile { file: "flat.npy".into(), wavelength: Some(532.123456789e-9) }];
         let polynomial = |range: f64| Curve::Polynomial { coefficients: vec![0.0, range, 0.1] };

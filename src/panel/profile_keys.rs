@@ -33,6 +33,7 @@ pub(super) struct ProfileFile {
     pub(super) settle_time: Option<Quantity>,
     pub(super) refresh: Option<Quantity>,
     pub(super) edid: Option<String>,
+    pub(super) note: Option<String>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) unverified: Vec<String>,
     pub(super) command: Option<PanelCommands>,

@@ -39,6 +39,7 @@ impl PanelProfile {
             settle_time: self.settle_time.map(|time| Quantity(format!("{time:?}s"))),
             refresh: self.refresh.map(|rate| Quantity(format!("{rate:?}Hz"))),
             edid: self.edid.clone(),
+            note: self.note.clone(),
             unverified: self.unverified.clone(),
             command: self.command.clone(),
             signal: Some(SignalFile {

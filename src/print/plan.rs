@@ -311,6 +311,18 @@ fn warnings(fringes: &PlateFringes, plan: &Plan) -> Vec<String> {
             ));
         }
     }
+    let finest = plate.raster.pitch_x.min(plate.raster.pitch_y);
+    if let Some(smallest) = plate.printer.as_ref().and_then(|printer| printer.smallest)
+        && plate.fringe.bits == 1
+        && finest < 0.9 * smallest
+    {
+        out.push(format!(
+            "one-bit fringes have lines and gaps down to a pixel, {}, and the printer's smallest are {}: what is finer comes out as it \
+             likes; take pixels of that size, or another printer",
+            show_length(finest),
+            show_length(smallest)
+        ));
+    }
     if let Some(free) = plan.disk_free.filter(|free| *free < plan.disk) {
         out.push(format!("the disk has {} MB free: the work will stop when it is full", free / 1_000_000));
     }

@@ -44,6 +44,19 @@ pub struct Work {
     pub fringe_seconds: f64,
 }
 
+impl Work {
+    /// What a user should know of the segments' fields, if it is not all as exact as was asked.
+    pub fn warning(&self) -> Option<String> {
+        let Self { inexact, error_bound, .. } = self;
+        (*inexact > 0).then(|| {
+            format!(
+                "{inexact} fields of segments may err by more than was asked, by up to {error_bound:.1e} of the segment's own light; \
+                 a dark one errs by little all the same: look at a preview"
+            )
+        })
+    }
+}
+
 impl AddAssign for Work {
     fn add_assign(&mut self, other: Self) {
         self.pixels += other.pixels;

@@ -37,6 +37,15 @@ def test_a_field_elsewhere_is_not_encoded_as_if_it_stood_on_the_panel(panel: hd.
     hd.encode(hd.propagate(wave, "100mm"), panel)
 
 
+def test_places_and_lasers_are_any_sequence(panel: hd.Panel) -> None:
+    frame = hd.encode(np.zeros(panel.shape), panel)
+    seen = [np.asarray(hd.reconstruct(frame, -0.1, eye=eye)) for eye in ((0, 0, 0.6), [0, "0m", "600mm"], np.array([0, 0, 0.6]))]
+    assert all((one == seen[0]).all() for one in seen)
+    with pytest.raises(TypeError, match="2 lengths where 3 are due"):
+        hd.reconstruct(frame, -0.1, eye=(0, 0.6))  # type: ignore[arg-type]
+    assert len(hd.hologram(hd.Points([[0.0, 0.0, -0.1]]), panel, wavelengths=["638nm", 520e-9, "450nm"])) == 3
+
+
 def test_slips_of_the_unit_are_refused() -> None:
     with pytest.raises(hd.Error, match="wavelength"):
         hd.Panel(width=64, height=48, pitch="8um", wavelength="532mm")

@@ -30,6 +30,7 @@ fn panel(width: usize, height: usize, fill_factor: f64, dead_space: f64, curve: 
         edid: None,
         corrections: Vec::new(),
         command: None,
+        note: None,
         crosstalk: 0.0,
         unmodulated: 0.0,
         beam: None,

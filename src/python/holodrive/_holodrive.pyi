@@ -15,13 +15,13 @@ Length: TypeAlias = float | str
 #: Radians, or text with a unit: "1.1deg".
 Angle: TypeAlias = float | str
 #: One for x and y, or (x, y).
-Lengths: TypeAlias = Length | tuple[Length, Length]
+Lengths: TypeAlias = Length | tuple[Length, Length] | list[Any] | NDArray[Any]
 #: (x, y, z) in the hologram frame.
-Place: TypeAlias = tuple[Length, Length, Length]
+Place: TypeAlias = tuple[Length, Length, Length] | list[Any] | NDArray[Any]
 #: Diameter, or all of the panel's light.
 Pupil: TypeAlias = Length | Literal["all"]
 #: Wavelengths of three lasers, or those that the panel's profile names.
-Lasers: TypeAlias = tuple[Length, Length, Length] | Literal["panel"]
+Lasers: TypeAlias = tuple[Length, Length, Length] | list[Any] | NDArray[Any] | Literal["panel"]
 PathLike: TypeAlias = str | os.PathLike[str]
 
 class Bar(Protocol):
@@ -32,7 +32,7 @@ class Bar(Protocol):
     def update(self, n: Any = ..., /) -> Any: ...
     def refresh(self) -> Any: ...
 
-Progress: TypeAlias = Callable[[str, int, int], object] | Bar | Literal[True] | None
+Progress: TypeAlias = Callable[[str, int, int], object] | Bar | bool | None
 
 class EncodeReport(TypedDict):
     """What came of an encoding on the panel's own levels."""

@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 use holodrive::names::Named;
 use holodrive::panel::Setup;
 use holodrive::units;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 
@@ -51,6 +52,18 @@ impl<'py> FromPyObject<'_, 'py> for Memory {
     }
 }
 
+/// So many lengths of any sequence: tuple, list, array [m]; none of what is no sequence.
+fn several<const N: usize>(value: &Borrowed<'_, '_, PyAny>) -> PyResult<Option<[f64; N]>> {
+    if value.cast::<PyString>().is_ok() || value.len().is_err() {
+        return Ok(None);
+    }
+    let lengths = value.try_iter()?.map(|one| Ok(one?.extract::<Length>()?.0)).collect::<PyResult<Vec<_>>>()?;
+    let count = lengths.len();
+    <[f64; N]>::try_from(lengths)
+        .map(Some)
+        .map_err(|_| PyTypeError::new_err(format!("{count} lengths where {N} are due")))
+}
+
 /// One length for x and y, or one for each [m].
 #[derive(Clone, Copy)]
 pub(crate) struct Lengths(pub(crate) [f64; 2]);
@@ -58,8 +71,8 @@ pub(crate) struct Lengths(pub(crate) [f64; 2]);
 impl<'py> FromPyObject<'_, 'py> for Lengths {
     type Error = PyErr;
     fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        if let Ok((Length(x), Length(y))) = value.extract::<(Length, Length)>() {
-            return Ok(Self([x, y]));
+        if let Some(both) = several(&value)? {
+            return Ok(Self(both));
         }
         value.extract::<Length>().map(|Length(both)| Self([both; 2]))
     }
@@ -78,23 +91,34 @@ pub(crate) struct Place(pub(crate) DVec3);
 impl<'py> FromPyObject<'_, 'py> for Place {
     type Error = PyErr;
     fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        let (Length(x), Length(y), Length(z)) = value.extract()?;
-        Ok(Self(DVec3::new(x, y, z)))
+        match several(&value)? {
+            Some(place) => Ok(Self(DVec3::from_array(place))),
+            None => Err(PyTypeError::new_err("a place is three lengths: (x, y, z)")),
+        }
     }
 }
 
 /// Wavelengths of three lasers [m], or "panel": those that its profile names.
-#[derive(FromPyObject)]
 pub(crate) enum Three {
-    Given(Length, Length, Length),
+    Given([f64; 3]),
     Of(String),
+}
+
+impl<'py> FromPyObject<'_, 'py> for Three {
+    type Error = PyErr;
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        match several(&value)? {
+            Some(three) => Ok(Self::Given(three)),
+            None => value.extract().map(Self::Of),
+        }
+    }
 }
 
 impl Three {
     /// The panel in the light of these.
     pub(crate) fn light(&self, py: Python<'_>, setup: &Setup) -> PyResult<Setup> {
         let given = match self {
-            Self::Given(one, two, three) => Some([one.0, two.0, three.0]),
+            Self::Given(three) => Some(*three),
             Self::Of(panel) if panel == "panel" => None,
             Self::Of(other) => {
                 return refused(py, "wavelengths", format!("`{other}` is no three lengths, nor \"panel\""));
