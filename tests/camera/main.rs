@@ -107,7 +107,7 @@ fn the_program_calibrates_by_a_command_that_takes_photos() {
     }
     let optics = ["--lens", "50mm", "--camera-pitch", "5.2um", "-o", "mine.toml"];
     let take = "cp taken/$(basename {frame}) {photo}.png";
-    refused(&[&base[..], &["--photos", "nowhere"], &optics].concat(), "dots.npy");
+    refused(&[&base[..], &["--photos", "nowhere"], &optics].concat(), "no such folder");
     refused(&[&base[..], &["--photos", "taken", "-o", "mine.toml"]].concat(), "lens");
     refused(&[&base[..], &["--camera-command", "exit 3; {photo}"], &optics].concat(), "ended with");
     refused(&[&base[..], &["--camera-command", "true"], &optics].concat(), "{photo}");
