@@ -55,11 +55,10 @@ pub(crate) fn meant(text: &str, names: &[&str]) -> String {
     // What stands on a box is in capitals.
     let text = &text.to_lowercase();
     let likeness = |name: &str| {
-        if text.len() > 3 && name.contains(text.as_str()) {
-            return 1.0;
-        }
         let parts = name.split('-').map(|part| 0.95 * strsim::jaro(text, part)).fold(0.0, f64::max);
-        strsim::jaro(text, name).max(parts)
+        // Whole within a longer name, it is meant unless another is closer.
+        let within = if text.len() > 3 && name.contains(text.as_str()) { 0.8 } else { 0.0 };
+        strsim::jaro(text, name).max(parts).max(within)
     };
     let all = names.iter().map(|name| (likeness(name), *name));
     match all.max_by(|a, b| a.0.total_cmp(&b.0)) {
