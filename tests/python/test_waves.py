@@ -150,7 +150,7 @@ def test_an_eye_sees_a_point_where_the_ray_meets_the_depth() -> None:
 def test_a_picture_of_cells_sums_the_light_of_its_samples() -> None:
     panel = hd.Panel(width=64, height=64, pitch="8um", wavelength=GREEN)
     field = hd.hologram(hd.Points([(0.0, 0.0, -0.05)]), panel)
-    whole, cells = hd.reconstruct(field, "-50mm"), hd.reconstruct(field, "-50mm", size=(16, 8))
+    whole, cells = hd.reconstruct(field, "-50mm"), hd.reconstruct(field, "-50mm", size=(16, 8), window="0.512mm")
     assert cells.shape == (8, 16) and whole.shape == (64, 64)
     assert np.asarray(cells, np.float64).sum() == pytest.approx(np.asarray(whole, np.float64).sum(), rel=1e-5)
     assert cells.window == pytest.approx((64 * 8e-6,) * 2)

@@ -231,8 +231,8 @@ impl<'py> Given<'py> {
             }
             Kind::Real => {
                 let (_, phases) = crate::arrays::real_plane(value, "field")?;
-                let waves = |_: &_| holodrive::field::Field::of_phases(grid, setup.wavelength, &phases);
-                let field = run(py, None, waves)?;
+                let waves = || holodrive::field::Field::of_phases(grid, setup.wavelength, &phases);
+                let field = py.detach(waves).raise(py)?;
                 Ok(Self::Array { samples: Samples::Own(field), are_phases: true })
             }
             Kind::Whole => {
