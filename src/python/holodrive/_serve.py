@@ -30,6 +30,8 @@ def _read(pipe: IO[str], tell: "Callable[[Optional[str]], None]") -> None:
 
 def _ended(process: "subprocess.Popen[str]", timeout: float = 5.0) -> None:
     """Ends the program as Ctrl-C does, so that the panel is left dark."""
+    if process.stdin is not None:
+        process.stdin.close()
     if process.poll() is not None:
         return
     if sys.platform == "win32":
@@ -86,6 +88,7 @@ class Served:
         if first is None:
             self._readers[1].join(1.0)
             self.process.wait()
+            self._end()
             raise DisplayError("".join(line or "" for line in self._errors).strip() or "the program ended before it served the panel")
         self.about: "dict[str, Any]" = json.loads(first)["serving"]
         self.name: str = self.about["name"]
