@@ -12,6 +12,7 @@ pub(super) const PROFILES: &[(&str, &str)] = &[
     ("holoeye-pluto-2.1", include_str!("../../calib/holoeye-pluto-2.1.toml")),
     ("jasper-jd7714", include_str!("../../calib/jasper-jd7714.toml")),
     ("meadowlark-p1920", include_str!("../../calib/meadowlark-p1920.toml")),
+    ("meadowlark-p1920-10", include_str!("../../calib/meadowlark-p1920-10.toml")),
     ("santec-slm-200", include_str!("../../calib/santec-slm-200.toml")),
     ("santec-slm-300-120hz", include_str!("../../calib/santec-slm-300-120hz.toml")),
     ("thorlabs-exulus-hd", include_str!("../../calib/thorlabs-exulus-hd.toml")),

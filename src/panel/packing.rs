@@ -107,7 +107,7 @@ mod tests {
     use crate::panel::PanelProfile;
     use proptest::prelude::*;
 
-    const ALL: [Packing; 9] = [
+    const ALL: [Packing; 10] = [
         Packing::Gray,
         Packing::Gray1,
         Packing::Red,
@@ -115,6 +115,7 @@ mod tests {
         Packing::Blue,
         Packing::Santec60,
         Packing::Santec120,
+        Packing::Meadowlark10,
         Packing::Planes24,
         Packing::Cells2x2,
     ];
@@ -137,6 +138,8 @@ mod tests {
         assert_eq!(packed(Packing::Santec60, 512), [128, 0, 0]);
         assert_eq!(packed(Packing::Santec120, 731), [0b1010_1010, 0b1010_1010, 0b1011_1011]);
         assert_eq!(packed(Packing::Santec120, 1023), [238, 238, 255]);
+        assert_eq!(packed(Packing::Meadowlark10, 731), [0b1011_0110, 0, 0b11]);
+        assert_eq!(packed(Packing::Meadowlark10, 1023), [255, 0, 3]);
         assert_eq!(packed(Packing::Gray, 137), [137; 3]);
         assert_eq!(packed(Packing::Red, 137), [137, 0, 0]);
         assert_eq!(packed(Packing::Green, 137), [0, 137, 0]);

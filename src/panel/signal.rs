@@ -22,6 +22,10 @@ pub enum Packing {
     /// Santec at 120 Hz: the first sub-frame as at 60 Hz, the second in R\[3:1\], G\[3:1\], B\[3:0\].
     #[serde(rename = "santec-120")]
     Santec120,
+    /// Meadowlark over HDMI, ten bits v: R = v≫2, and the two lowest bits in those of blue. The maker's own text was not at hand;
+    /// this is what openwfs sends to such a panel (IvoVellekoop/openwfs, pull request 73).
+    #[serde(rename = "meadowlark-10")]
+    Meadowlark10,
     /// 24 one-bit frames a video frame, in the order green 0 … 7, red 0 … 7, blue 0 … 7 of a DLP controller's pattern
     /// mode.
     #[serde(rename = "planes-24")]
@@ -37,7 +41,7 @@ impl Packing {
         match self {
             Self::Gray | Self::Red | Self::Green | Self::Blue => 8,
             Self::Gray1 | Self::Planes24 => 1,
-            Self::Santec60 | Self::Santec120 => 10,
+            Self::Santec60 | Self::Santec120 | Self::Meadowlark10 => 10,
             Self::Cells2x2 => 4,
         }
     }
@@ -59,6 +63,7 @@ impl Packing {
             Self::Blue => "blue",
             Self::Santec60 => "santec-60",
             Self::Santec120 => "santec-120",
+            Self::Meadowlark10 => "meadowlark-10",
             Self::Planes24 => "planes-24",
             Self::Cells2x2 => "cells-2x2",
         }
@@ -88,6 +93,10 @@ impl Packing {
                 rgb[1] |= g << shift[1];
                 rgb[2] |= b << shift[2];
             }
+            Self::Meadowlark10 => {
+                rgb[0] = (level >> 2) as u8;
+                rgb[2] = (level & 3) as u8;
+            }
             Self::Planes24 => rgb[[1, 0, 2][slot / 8]] |= (level.min(1) as u8) << (slot % 8),
             Self::Cells2x2 => rgb.fill(if level >> cell & 1 == 1 { 255 } else { 0 }),
         }
@@ -103,6 +112,7 @@ impl Packing {
             Self::Blue => b,
             Self::Santec60 | Self::Santec120 if slot == 0 => (r >> 5) << 7 | (g >> 5) << 4 | b >> 4,
             Self::Santec60 | Self::Santec120 => (r >> 1 & 7) << 7 | (g >> 1 & 7) << 4 | b & 15,
+            Self::Meadowlark10 => r << 2 | b & 3,
             Self::Planes24 => [g, r, b][slot / 8] >> (slot % 8) & 1,
             Self::Cells2x2 => (g >> 7) << cell,
         }

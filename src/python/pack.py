@@ -22,7 +22,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 #: What may be installed with it.
-EXTRAS = ("progress", "slmsuite")
+EXTRAS = ("progress", "slmsuite", "micromanager")
 
 
 def stated(text: str, key: str) -> str:

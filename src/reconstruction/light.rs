@@ -16,6 +16,7 @@ use crate::field::arrays::{self, Named, Values};
 use crate::field::{Field, npy};
 use crate::points::colour::Lasers;
 use crate::progress::Progress;
+use crate::scene::texture::srgb_from_linear;
 use glam::DVec2;
 use std::path::Path;
 
@@ -184,6 +185,19 @@ impl Reconstruction {
             (_, Scale::White(white)) => white,
             (Self::Gray(seen), scale) => seen.white(scale),
             (Self::Color(seen), Scale::Percentile(part)) => seen.percentile(part),
+        }
+    }
+
+    /// Values divided by the white one, clipped to [0, 1] and sRGB-coded: what a screen is given, in colour red, green and blue of each
+    /// pixel.
+    pub fn coded(&self, scale: Scale) -> Vec<f32> {
+        match self {
+            Self::Gray(seen) => seen.coded(scale),
+            Self::Color(seen) => {
+                let white = self.white(scale);
+                let gain = if white > 0.0 { 1.0 / white } else { 0.0 };
+                seen.rgb.as_flattened().iter().map(|v| srgb_from_linear((v * gain).clamp(0.0, 1.0))).collect()
+            }
         }
     }
 

@@ -89,3 +89,55 @@ def test_a_glb_is_read_from_bytes_and_files_beside_it_are_not() -> None:
         hd.Scene.from_bytes(packed(path)[:-100])
     with pytest.raises(hd.InputError):
         hd.Scene.from_bytes(b"")
+
+
+def test_three_lasers_are_seen_and_judged_in_colour(wide: hd.Panel, room: hd.Scene, tmp_path: Path) -> None:
+    points = room.points(wide, rays=(60, 60))
+    light = hd.light_field(points, wide, wavelengths=LASERS, eye=(0, 0, 0.6), pupil="4mm")
+    assert light.channels == 3
+    frames = hd.encode(light, wide, wavelengths=LASERS, iterations=12)
+    told = hd.judge(frames, light, looks=4)
+    assert told["psnr"] > 20
+    # The same frames against a world in which red and blue are exchanged: the colours are judged, not the brightness alone.
+    codes = [light.peak * (light.codes(channel) / 65535.0) ** 2 for channel in (2, 1, 0)]
+    other = hd.LightField(np.stack(codes, -1), eye=light.eye, spacing=light.spacing, window=light.window, depth=light.depth)
+    assert hd.judge(frames, other, looks=4)["psnr"] < told["psnr"] - 3
+    picture = hd.reconstruct(frames, points.focus["near"], eye=(0, 0, 0.6), size=(48, 27))
+    assert picture.shape == picture.values.shape == (27, 48, 3) and picture.coded().shape == (27, 48, 3)
+    assert "in colour" in repr(picture) and picture._repr_png_()[25] == 2, "a PNG in red, green and blue"
+    # What stands left in this room is red, what stands right green.
+    left, right = picture.values[8:19, 12:15].mean((0, 1)), picture.values[8:19, 33:36].mean((0, 1))
+    assert left[0] > 1.5 * left[1] and right[1] > 1.5 * right[0]
+    picture.save(tmp_path / "seen.png")
+    picture.save(tmp_path / "seen.npy")
+    assert np.array_equal(np.load(tmp_path / "seen.npy"), picture.values)
+    with pytest.raises(hd.Error, match="colour is written as .png or .npy"):
+        picture.save(tmp_path / "seen.tif")
+
+
+def test_a_dark_laser_of_three_needs_their_names(panel: hd.Panel) -> None:
+    fields = hd.hologram(hd.Points([(2e-5, 1e-5, -0.1)], rgb=[[1, 1, 1]]), panel, wavelengths=LASERS)
+    white = hd.reconstruct(fields, "-100mm", size=(9, 9), window=("0.2mm", "0.2mm"))
+    row, column, _ = np.unravel_index(np.argmax(white), white.shape)
+    assert abs(white.x[column] - 2e-5) < 2e-5 and abs(white.y[row] - 1e-5) < 2e-5
+    without_green = [fields[0], None, fields[2]]
+    with pytest.raises(hd.ParameterError, match="name the three lasers"):
+        hd.reconstruct(without_green, "-100mm")
+    magenta = hd.reconstruct(without_green, "-100mm", size=(9, 9), window=("0.2mm", "0.2mm"), wavelengths=LASERS)
+    assert magenta.values[row, column, 1] < 0.2 * white.values[row, column, 1]
+    for wrong, words in [(fields[::-1], "in this order"), (fields[:2], "several wavelengths"), ([None], "no light"), ([fields[0], 3], "a list holds")]:
+        with pytest.raises(hd.ParameterError, match=words):
+            hd.reconstruct(wrong, "-100mm")  # type: ignore[arg-type]
+    with pytest.raises(hd.ParameterError, match="give three lengths"):
+        hd.reconstruct(without_green, "-100mm", wavelengths="panel")
+    with pytest.raises(hd.ParameterError, match="of a list of three"):
+        hd.reconstruct(fields[0], "-100mm", wavelengths=LASERS)  # type: ignore[arg-type]
+
+
+def test_a_slow_eye_sees_the_mean_of_sub_frames(panel: hd.Panel) -> None:
+    fields = [hd.hologram(hd.Points([(x, 0, -0.05)]), panel) for x in (-4e-5, 4e-5)]
+    frames = [hd.encode(field, panel) for field in fields]
+    for each in (fields, frames):
+        both = np.asarray(hd.reconstruct(each, "-50mm"))
+        alone = [np.asarray(hd.reconstruct(one, "-50mm")) for one in each]
+        assert np.allclose(both, (alone[0] + alone[1]) / 2, rtol=1e-4, atol=1e-6 * both.max())

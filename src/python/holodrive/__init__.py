@@ -55,10 +55,12 @@ from ._holodrive import (
     reconstruct,
 )
 from ._serve import Served, serve
+from ._together import Bench, Together
 from .slm import SLM, Shown
 
 __all__ = [
     "SLM",
+    "Bench",
     "CalibrationError",
     "DisplayError",
     "Error",
@@ -77,6 +79,7 @@ __all__ = [
     "Scene",
     "Served",
     "Shown",
+    "Together",
     "UndersampledError",
     "UnsupportedError",
     "__version__",

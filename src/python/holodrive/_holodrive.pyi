@@ -287,13 +287,13 @@ class LightField:
 
 @final
 class Picture:
-    """What is seen of a field or a frame: linear intensity."""
+    """What is seen of a field or a frame: linear intensity, or colours of linear light."""
 
     @property
     def values(self) -> NDArray[np.float32]: ...
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]: ...
     @property
-    def shape(self) -> tuple[int, int]: ...
+    def shape(self) -> tuple[int, ...]: ...
     @property
     def focus(self) -> float: ...
     @property
@@ -348,6 +348,7 @@ def light_field(
     pupil: Pupil | None = None,
     eye_box: Lengths | None = None,
     channel: str = "luminance",
+    wavelengths: Lasers | None = None,
     progress: Progress = None,
 ) -> LightField: ...
 @overload
@@ -439,13 +440,14 @@ def encode_in_the_loop(
     progress: Progress = None,
 ) -> Frame: ...
 def reconstruct(
-    light: Frame | Field,
+    light: Frame | Field | list[Frame | None] | list[Field | None] | list[Frame] | list[Field],
     z: Length,
     *,
     eye: Place | None = None,
     pupil: Length | None = None,
     size: tuple[int, int] | None = None,
     window: Lengths | None = None,
+    wavelengths: Lasers | None = None,
     subpixels: int = 1,
     crosstalk: float = 0.0,
     wavefront_error: PathLike | None = None,
@@ -453,12 +455,13 @@ def reconstruct(
     progress: Progress = None,
 ) -> Picture: ...
 def judge(
-    frames: Frame | Sequence[Frame],
+    frames: Frame | Sequence[Frame | None],
     light: LightField,
     *,
     eye: Place | None = None,
     pupil: Pupil | None = None,
     eye_box: Lengths | None = None,
+    wavelengths: Lasers | None = None,
     looks: int = 24,
     seed: int = 1,
     progress: Progress = None,

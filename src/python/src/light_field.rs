@@ -4,7 +4,7 @@ use crate::arrays::{array, handed, lent, shown, values};
 use crate::errors::{Raise, refused};
 use crate::panel::Panel;
 use crate::points::{Points, Source};
-use crate::quantities::{Length, Lengths, Place, named};
+use crate::quantities::{Length, Lengths, Place, Three, named};
 use crate::run::run;
 use crate::scene::Scene;
 use glam::{DVec2, DVec3};
@@ -289,11 +289,12 @@ pub(crate) fn views(
 /// :param pupil: diameter of the pupil [m], by default 4 mm, or "all" for all of the panel's light.
 /// :param eye_box: width and height of the box that the pupil's middle moves in [m].
 /// :param channel: "luminance", "red", "green" or "blue".
+/// :param wavelengths: of three lasers [m], or "panel", for views in colour, as in :func:`hologram`.
 /// :param progress: see :func:`hologram`.
 /// :return: :class:`LightField`.
 #[pyfunction]
 #[pyo3(signature = (
-    source, panel, *, eye = None, pupil = None, eye_box = None, channel = "luminance", progress = None
+    source, panel, *, eye = None, pupil = None, eye_box = None, channel = "luminance", wavelengths = None, progress = None
 ))]
 #[expect(clippy::too_many_arguments)] // Python's keywords
 pub(crate) fn light_field(
@@ -304,13 +305,19 @@ pub(crate) fn light_field(
     pupil: Option<PupilGiven>,
     eye_box: Option<Lengths>,
     channel: &str,
+    wavelengths: Option<Three>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<LightField> {
+    if wavelengths.is_some() && channel != "luminance" {
+        return refused(py, "channel", "is of one laser: leave out wavelengths");
+    }
     let Some(content) = Content::of(source, panel.get(), progress)? else {
         return refused(py, "source", "is no Scene, Points or LightField");
     };
     let viewer = Looking { eye, pupil, eye_box }.viewer(content.views());
-    let (source, setup, channel) = (content.source(&viewer), &panel.get().setup, named(py, channel)?);
+    let setup = &panel.get().setup;
+    let setup = &wavelengths.map_or_else(|| Ok(setup.clone()), |three| three.light(py, setup))?;
+    let (source, channel) = (content.source(&viewer), named(py, channel)?);
     run(py, progress, |progress| views(&source, setup, viewer, channel, progress)).map(|light| LightField { light })
 }
 

@@ -4,6 +4,7 @@ use crate::errors::{Raise, refused};
 use glam::{DVec2, DVec3};
 use holodrive::names::Named;
 use holodrive::panel::Setup;
+use holodrive::points::colour::Lasers;
 use holodrive::units;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -126,6 +127,49 @@ impl Three {
         };
         setup.clone().in_color(given).raise(py)
     }
+}
+
+/// The lasers of what is seen together, by the wavelength of each item [m], None where one is dark: three lasers, given or those of three
+/// items in the order red, green, blue; none where all are of one wavelength, shown in turn.
+pub(crate) fn lasers_of(
+    py: Python<'_>,
+    items: &[Option<f64>],
+    given: Option<&Three>,
+    panel: Option<&Setup>,
+) -> PyResult<Option<Lasers>> {
+    let same = |a: f64, b: f64| (a - b).abs() <= 1e-6 * b;
+    let lit: Vec<f64> = items.iter().flatten().copied().collect();
+    let lasers = match (given, panel) {
+        (Some(Three::Given(three)), _) => Lasers::new(*three).raise(py)?,
+        (Some(three), Some(panel)) => match three.light(py, panel)?.lasers {
+            Some(lasers) => lasers,
+            None => return refused(py, "wavelengths", "are of no lasers"),
+        },
+        (Some(_), None) => return refused(py, "wavelengths", "a field names no panel: give three lengths"),
+        (None, _) if lit.iter().all(|wavelength| same(*wavelength, lit[0])) => {
+            if lit.len() < items.len() {
+                return refused(py, "wavelengths", "name the three lasers, of which one has no light here");
+            }
+            return Ok(None);
+        }
+        (None, _) => match *lit {
+            [red, green, blue] if items.len() == 3 => Lasers::new([red, green, blue]).raise(py)?,
+            _ if items.len() == 3 => {
+                return refused(py, "wavelengths", "name the three lasers, of which one has no light here");
+            }
+            _ => {
+                let what = format!("{} of several wavelengths: give one for each of three lasers", items.len());
+                return refused(py, "frames", what);
+            }
+        },
+    };
+    let told = lasers.wavelengths();
+    let fits = items.len() == 3 && items.iter().zip(told).all(|(item, laser)| item.is_none_or(|w| same(w, laser)));
+    if !fits {
+        let told = told.map(holodrive::units::show_length).join(", ");
+        return refused(py, "frames", format!("are not those of {told}: three in this order, None for a dark one"));
+    }
+    Ok(Some(lasers))
 }
 
 /// The value of that name of a closed set.
