@@ -7,8 +7,10 @@ import binascii
 import importlib
 import json
 import logging
+import socket
 import socketserver
 import threading
+import time
 import urllib.parse
 import zlib
 from types import TracebackType
@@ -119,6 +121,7 @@ class Remote:
                 log.exception("%s %s failed", who, what)
                 text = json.dumps([False, "Server error. See the server's log for details."])
             client.wfile.write((urllib.parse.quote_plus(text) + "\n").encode())
+            _read_to_the_end(client.connection)
         except OSError as error:
             log.warning("%s %s has gone: %s", who, what, error)
         finally:
@@ -158,6 +161,20 @@ class Remote:
             # What slmsuite's clients make of a phase φ: round(−φ·N/2π) − 1 modulo N.
             count = 2**slm.bitdepth
             slm.set_phase((count - 1 - levels.astype(np.float64)) * (2 * np.pi / count), phase_correct=False)
+
+
+def _read_to_the_end(connection: socket.socket) -> None:
+    """Takes what the client still sends, for a second at most: a socket that is closed with bytes unread takes the answer with it."""
+    connection.shutdown(socket.SHUT_WR)
+    end = time.monotonic() + 1.0
+    try:
+        while (left := end - time.monotonic()) > 0:
+            connection.settimeout(left)
+            if not connection.recv(65536):
+                return
+    except socket.timeout:
+        # Silent, which is its own affair.
+        pass
 
 
 def _request(line: bytes) -> "tuple[str, str, Dict[str, Any]]":
