@@ -3,7 +3,7 @@
 use super::args::PrintArgs;
 use super::load::{Input, input};
 use crate::points::depth_map::DepthReading;
-use crate::print::{PictureDepths, PictureFiles, Plate, Source};
+use crate::print::{PictureDepths, PictureFiles, Plate, Source, ViewFiles, ViewReading};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,18 @@ pub(super) fn source(args: &PrintArgs, path: &Path, plate: &Plate) -> Result<Sou
         far: args.far.unwrap_or(ends[0].min(ends[1])),
         reading,
     };
-    let found = of(path, place, depths)?;
+    let from = ViewReading {
+        spacing: args.view_spacing,
+        rows: args.view_rows,
+        height: args.view_height,
+        ..ViewReading::default()
+    };
+    let found = of(path, place, depths, from.clone())?;
+    if !matches!(found, Source::Views(_)) && from != ViewReading::default() {
+        let named = [("view-spacing", args.view_spacing.is_some()), ("view-rows", args.view_rows.is_some())];
+        let name = named.iter().find(|(_, given)| *given).map_or("view-height", |(name, _)| name);
+        return Err(Error::parameter(name, "is for views: a folder of pictures, or a light field"));
+    }
     let is_relief = matches!(&found, Source::Pictures(PictureFiles { depths: PictureDepths::Relief { .. }, .. }));
     if !is_relief && (near || far || reading != DepthReading::default()) {
         let what = "is for a picture with its depth map (rgb.png+depth.png); a picture alone stands where it says, logo.png@-6mm";
@@ -30,10 +41,13 @@ pub(super) fn source(args: &PrintArgs, path: &Path, plate: &Plate) -> Result<Sou
 
 /// What was typed to be compared with a plate, which knows itself where its pictures stand.
 pub(super) fn same(path: &Path) -> Result<Source> {
-    of(path, 0.0, PictureDepths::Flat(Vec::new()))
+    of(path, 0.0, PictureDepths::Flat(Vec::new()), ViewReading::default())
 }
 
-fn of(path: &Path, place: f64, relief: PictureDepths) -> Result<Source> {
+fn of(path: &Path, place: f64, relief: PictureDepths, views: ViewReading) -> Result<Source> {
+    if path.is_dir() {
+        return Ok(Source::Views(ViewFiles::new(path, views)));
+    }
     let pictures = |files: Vec<PathBuf>, depths| Source::Pictures(PictureFiles { files, depths });
     Ok(match input(path)? {
         Input::Frame(path) => pictures(vec![path], PictureDepths::Flat(vec![place])),
@@ -42,6 +56,7 @@ fn of(path: &Path, place: f64, relief: PictureDepths) -> Result<Source> {
             let (files, depths) = stack.into_iter().unzip();
             pictures(files, PictureDepths::Flat(depths))
         }
-        Input::Scene(path) | Input::Points(path) | Input::Field(path) | Input::Views(path) => Source::File(path),
+        Input::Views(path) => Source::Views(ViewFiles::new(&path, views)),
+        Input::Scene(path) | Input::Points(path) | Input::Field(path) => Source::File(path),
     })
 }

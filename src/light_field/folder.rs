@@ -13,14 +13,15 @@
 //!
 //! It is written last: a folder without it is not whole, and not read.
 
-use super::LightField;
 use super::codes::put;
 use super::file::{Description, within};
+use super::{EyeGrid, LightField};
 use crate::error::{Error, Result};
-use crate::field::npy;
+use crate::field::{Grid, npy};
 use crate::files;
+use crate::points::Channel;
 use crate::scene::texture::{linear_from_srgb, srgb_from_linear};
-use glam::Vec3;
+use glam::{DVec2, Vec3};
 use std::path::{Path, PathBuf};
 
 const JSON: &str = "light-field.json";
@@ -81,6 +82,23 @@ impl LightField {
             writer.write_image_data(&bytes).map_err(refused)?;
             writer.finish().map_err(refused)
         })
+    }
+
+    /// One gray view: the luminance of a picture (sRGB-coded, what is clear in it black) whose pixels are a window's.
+    ///
+    /// # Errors
+    /// As [`LightField::black`].
+    pub(crate) fn of_picture(picture: image::DynamicImage, window: Grid) -> Result<Self> {
+        let eyes = EyeGrid { distance: 1.0, center: DVec2::ZERO, spacing: 1.0, columns: 1, rows: 1 };
+        let mut field = Self::black(eyes, window, 1)?;
+        let decode: Vec<f32> = (0..=u16::MAX).map(|code| linear_from_srgb(f32::from(code) / Self::FULL)).collect();
+        let rgba = picture.into_rgba16();
+        for (code, pixel) in field.channels[0].iter_mut().zip(rgba.pixels()) {
+            let [red, green, blue, alpha] = pixel.0;
+            let light = Channel::Luminance.of([red, green, blue].map(|code| decode[usize::from(code)]));
+            *code = Self::code(light * f32::from(alpha) / Self::FULL, 1.0);
+        }
+        Ok(field)
     }
 
     /// Whether a folder says that it holds a light field.

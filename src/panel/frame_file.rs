@@ -366,7 +366,9 @@ mod tests {
     fn frames_and_signals_come_back_with_their_metadata() {
         let folder = tempfile::tempdir().expect("folder");
         let ten = [(10, "santec-60"), (10, "meadowlark-10")];
-        for (bits, packing) in [(1, "gray1"), (2, "gray"), (4, "cells-2x2"), (8, "gray"), (8, "red")].into_iter().chain(ten) {
+        for (bits, packing) in
+            [(1, "gray1"), (2, "gray"), (4, "cells-2x2"), (8, "gray"), (8, "red")].into_iter().chain(ten)
+        {
             let profile = profile(bits, packing);
             let frame = noise(&profile);
             let path = folder.path().join("frame.png");

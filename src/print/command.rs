@@ -4,6 +4,7 @@ use super::manifest::{Settings, same_plate};
 use super::plate::{Binarisation, Plate};
 use super::plate_size::{Asked, PlateSize};
 use super::source::PictureDepths;
+use super::view_files::ViewReading;
 use crate::names::Named;
 use crate::scene::environment::Sky;
 use crate::segments::{PointPhase, SceneOptions};
@@ -22,6 +23,15 @@ fn quoted(text: &str) -> String {
 
 /// The input as it is typed, and where it stands.
 fn input(settings: &Settings) -> Vec<String> {
+    if let Some(ViewReading { spacing, rows, height, name }) = settings.views() {
+        let mut words = vec![quoted(&name)];
+        let lengths = [("--view-spacing", spacing), ("--view-height", height)];
+        words.extend(lengths.into_iter().flat_map(|(flag, length)| {
+            length.into_iter().flat_map(move |length| [flag.to_owned(), show_length(length)])
+        }));
+        words.extend(rows.into_iter().flat_map(|rows| ["--view-rows".to_owned(), rows.to_string()]));
+        return words;
+    }
     let names: Vec<&str> = settings.inputs.iter().map(|input| input.name.as_str()).collect();
     match settings.pictures() {
         None => names.first().map(|name| quoted(name)).into_iter().collect(),

@@ -85,6 +85,7 @@ impl PlateJob {
         let object = match &input {
             Source::File(input) => Object::read(input, &options, &plane, progress)?,
             Source::Pictures(pictures) => pictures.object(&plate, &plane)?,
+            Source::Views(views) => views.object(&plate, &plane)?,
         };
         let fringes = PlateFringes { plate, wave: ObjectWave { plane, object, instruction_set } };
         Ok(Self { fringes, settings, folder, shard, manifest, amplitude: None })

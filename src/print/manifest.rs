@@ -2,6 +2,7 @@
 
 use super::plate::Plate;
 use super::source::{PictureDepths, PictureFiles, Source};
+use super::view_files::{ViewFiles, ViewReading};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::scene::gltf;
@@ -23,6 +24,9 @@ pub(super) const NOT_THE_INPUT: &str = "is not the file that the plate was made 
 
 /// Key of the options that says where pictures stand.
 const PICTURES: &str = "pictures";
+
+/// Key of the options that says how views are read.
+const VIEWS: &str = "views";
 
 /// A manifest is not larger than this [bytes]: the hashes of a million tiles.
 const LARGEST: u64 = 96 << 20;
@@ -65,7 +69,7 @@ pub struct Manifest {
 }
 
 impl Settings {
-    /// What decides a plate of a scene, of points or of pictures.
+    /// What decides a plate of a scene, of points, of pictures or of views.
     ///
     /// # Errors
     /// [`Error::Io`] for files that cannot be read.
@@ -73,11 +77,15 @@ impl Settings {
         let program = concat!("holodrive ", env!("CARGO_PKG_VERSION")).to_owned();
         let input = match source {
             Source::File(input) => input,
+            Source::Views(views) => {
+                let reading = serde_json::to_value(&views.reading).unwrap_or_default();
+                let options = BTreeMap::from([(VIEWS.to_owned(), reading)]);
+                return Ok(Self { program, plate: plate.clone(), inputs: named(&views.files()?)?, options });
+            }
             Source::Pictures(pictures) => {
                 let depths = serde_json::to_value(&pictures.depths).unwrap_or_default();
                 let options = BTreeMap::from([(PICTURES.to_owned(), depths)]);
-                let file = |path: &PathBuf| Ok(Input { name: name(path), sha256: file_sha256(path)? });
-                let inputs = pictures.files.iter().map(file).collect::<Result<_>>()?;
+                let inputs = named(&pictures.files)?;
                 return Ok(Self { program, plate: plate.clone(), inputs, options });
             }
         };
@@ -96,6 +104,11 @@ impl Settings {
     /// Where the pictures stand that a plate was made of; none of a scene or of points.
     pub(super) fn pictures(&self) -> Option<PictureDepths> {
         self.options.get(PICTURES).and_then(|depths| serde_json::from_value(depths.clone()).ok())
+    }
+
+    /// How the views were read that a plate was made of; none of anything else.
+    pub(super) fn views(&self) -> Option<ViewReading> {
+        self.options.get(VIEWS).and_then(|reading| serde_json::from_value(reading.clone()).ok())
     }
 
     /// How the scene of a plate was lit; the usual way where nothing was.
@@ -133,6 +146,14 @@ impl Settings {
             }
         }
         Ok(())
+    }
+
+    /// Refuses other views than those that the plate was made of.
+    ///
+    /// # Errors
+    /// [`Error::Input`]; [`Error::Io`].
+    pub(super) fn check_views(&self, views: &ViewFiles) -> Result<()> {
+        if named(&views.files()?)? == self.inputs { Ok(()) } else { Err(Error::input(&views.path, NOT_THE_INPUT)) }
     }
 
     /// The first setting in which two differ, with both values; numbers are compared as they are written.
@@ -256,6 +277,11 @@ fn hex(bytes: &[u8]) -> String {
 
 fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().to_string()
+}
+
+/// Files by their names and hashes.
+fn named(files: &[PathBuf]) -> Result<Vec<Input>> {
+    files.iter().map(|path| Ok(Input { name: name(path), sha256: file_sha256(path)? })).collect()
 }
 
 /// SHA-256 of a file, hexadecimal.

@@ -55,6 +55,7 @@ mod thinning;
 mod tiff;
 mod transfer;
 mod view;
+mod view_files;
 mod zarr;
 
 pub use calibrate::PlateCalibration;
@@ -75,3 +76,4 @@ pub use sheet::write_sheet;
 pub use source::{PictureDepths, PictureFiles, Source};
 pub use transfer::Transfer;
 pub use view::{PlateView, ViewReport};
+pub use view_files::{ViewFiles, ViewReading};

@@ -206,7 +206,7 @@ pub fn plan(fringes: &PlateFringes, folder: &Path, progress: &Progress) -> Resul
         + sample.most_points * 400
         + (64 << 20);
     let rays = match fringes.wave.object {
-        Object::Points(_) | Object::ColorPoints(_) => 0,
+        Object::Points(_) | Object::ColorPoints(_) | Object::Views(_) => 0,
         Object::Scene(_) => {
             (work.points as f64 / work.segments as f64 * sample.segments as f64) as u64
                 * u64::from(plate.view.rays).pow(2)
@@ -280,8 +280,23 @@ fn warnings(fringes: &PlateFringes, plan: &Plan) -> Vec<String> {
     if plate.fringe.bits == 1 && plate.fringe.quantity == Quantity::Phase {
         out.push("a phase of two levels has a conjugate image as bright as the object".into());
     }
-    if !matches!(object, Object::Scene(_)) {
+    if matches!(object, Object::Points(_) | Object::ColorPoints(_)) {
         out.push(NOT_A_SCENE.into());
+    }
+    if let Object::Views(views) = object {
+        let (center, half, distance) = views.eye_box();
+        for (axis, name) in ["x", "y"].into_iter().enumerate() {
+            let reach = 0.5 * plan.extent[axis] + center[axis].abs() + half[axis];
+            let sent = distance * fringes.wave.plane.band.angle[axis].tan();
+            if reach > sent {
+                out.push(format!(
+                    "along {name} the outermost view and the plate's far edge are {} apart, and light goes {} aside at that distance: \
+                     those corners are dark; set views closer, or give the fringes a finer pitch",
+                    mm(reach),
+                    mm(sent)
+                ));
+            }
+        }
     }
     if let Some(slit) = &plate.slit {
         let sine = plan.reference_frequencies[1][1].abs().max(plan.reference_frequencies[1][0].abs())

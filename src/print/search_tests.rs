@@ -6,12 +6,13 @@ use super::*;
 use crate::encode::fringe::order_statistic;
 use crate::field::Complex64;
 use crate::progress::Progress;
-use crate::segments::{Object, Piece};
+use crate::segments::Object;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-/// Side of the plates [px].
-const SIDE: usize = 256;
+/// Side of the plates, and of their tiles: half of the smallest built-in plate's [px].
+const SIDE: usize = 512;
+const TILE: usize = 128;
 
 fn plate_of(binarisation: &str, tile: u64) -> Plate {
     let lines = format!("bits = 1\nbinarisation = \"{binarisation}\"\ntile = {tile}");
@@ -53,14 +54,13 @@ fn noise_in_box(plate: &Plate, bits: &[f64], wishes: &[f64]) -> (Vec<f64>, f64) 
 }
 
 #[test]
-fn a_searched_eye_box_has_little_noise_and_not_much_more_along_seams() {
-    let source = || Object::Points(cloud(16));
-    let of = |binarisation: &str, tile: u64| {
-        let plate = plate_of(binarisation, tile);
-        let fringes = fringes(&plate, source());
+fn a_searched_eye_box_has_little_noise_and_hardly_more_along_seams() {
+    let of = |binarisation: &str, tile: usize, object: usize| {
+        let plate = plate_of(binarisation, tile as u64);
+        let fringes = fringes(&plate, Object::Points(cloud(16 * (object as u64 + 1)).split_off(16 * object)));
         let area = fringe_area(&plate);
-        let piece = Piece { segment: [0, 0], rect: area };
-        let (field, _) = fringes.wave.field(&area, &[piece], &Progress::new()).expect("field");
+        let pieces = fringes.wave.plane.pieces(&area, &area);
+        let (field, _) = fringes.wave.field(&area, &pieces, &Progress::new()).expect("field");
         // As a plan chooses it.
         let mut moduli: Vec<f32> = field.iter().map(|u| u.norm()).collect();
         let rank = (plate.fringe.percentile * (moduli.len() - 1) as f64) as usize;
@@ -70,28 +70,36 @@ fn a_searched_eye_box_has_little_noise_and_not_much_more_along_seams() {
         let (noise, signal) = noise_in_box(&plate, &bits, &wishes);
         (bits, noise, signal)
     };
-    let (bits, noise, signal) = of("direct-search", 64);
-    let (one, even, _) = of("direct-search", SIDE as u64);
-    let differ = bits.iter().zip(&one).filter(|(a, b)| a != b).count() as f64 / one.len() as f64;
     let mean = |noise: &[f64], keep: &dyn Fn(usize) -> bool| {
         let kept: Vec<f64> = (0..noise.len()).filter(|&i| keep(i)).map(|i| noise[i]).collect();
         kept.iter().sum::<f64>() / kept.len() as f64
     };
-    let near = |at: usize| (at % 64).min(64 - at % 64) < 8 && (8..SIDE - 8).contains(&at);
-    let seam = |i: usize| near(i % SIDE) || near(i / SIDE);
+    let near =
+        |at: usize, reach: usize| (at % TILE).min(TILE - 1 - at % TILE) < reach && (reach..SIDE - reach).contains(&at);
     let inside = |i: usize| [i % SIDE, i / SIDE].iter().all(|at| (16..SIDE - 16).contains(at));
-    let ratio = mean(&noise, &|i| inside(i) && seam(i)) / mean(&even, &|i| inside(i) && seam(i));
     let snr = |noise: &[f64], signal: f64| 10.0 * (signal / mean(noise, &inside)).log10();
-    let searched = snr(&noise, signal);
+    // One plate's strips hold some hundred grains of noise, whose mean is known to 8 %: those of several are taken together.
+    let (mut seams, mut even) = ([0.0; 2], [0.0; 2]);
+    let mut searched = Vec::new();
+    for object in 0..4 {
+        let (bits, noise, signal) = of("direct-search", TILE, object);
+        let (one, alone, _) = of("direct-search", SIDE, object);
+        assert!(bits != one, "tiles are searched by themselves");
+        for (k, reach) in [8, 16].into_iter().enumerate() {
+            let strip = |i: usize| inside(i) && (near(i % SIDE, reach) || near(i / SIDE, reach));
+            seams[k] += mean(&noise, &strip);
+            even[k] += mean(&alone, &strip);
+        }
+        searched.push(snr(&noise, signal));
+    }
+    let ratios = [seams[0] / even[0], seams[1] / even[1]];
     let others = ["threshold", "diffusion"].map(|way| {
-        let (_, noise, signal) = of(way, 64);
+        let (_, noise, signal) = of(way, TILE, 0);
         snr(&noise, signal)
     });
-    println!("differ {differ:.4}, seams {ratio:.3}; searched {searched:.1} dB, others {others:.1?} dB");
-    // Seams are not free: 1.18 here (0.7 dB) in a strip of eight pixels beside a tile's edge, which has fewer neighbours to take
-    // its noise; from 1.15 to 1.67 with halos of 0 to 96 pixels and 4 or 12 sweeps, none of them plainly better.
-    assert!(ratio < 1.4, "noise along seams is {ratio} of what one tile has there");
-    assert!(others.iter().all(|other| searched > other + 8.0), "{searched} against {others:?} dB");
+    println!("seams {ratios:.3?} of one tile's noise there; searched {searched:.1?} dB, others {others:.1?} dB");
+    assert!(ratios.iter().all(|ratio| *ratio < 1.1), "noise along seams is {ratios:?} of what one tile has there");
+    assert!(others.iter().all(|other| searched[0] > other + 8.0), "{searched:?} against {others:?} dB");
 }
 
 #[test]

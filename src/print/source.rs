@@ -1,6 +1,7 @@
-//! What a plate shows, as it is asked for: a scene or points in a file, or pictures at depths.
+//! What a plate shows, as it is asked for: a scene or points in a file, pictures at depths, or views.
 
 use super::plate::Plate;
+use super::view_files::ViewFiles;
 use crate::error::{Error, Result};
 use crate::points::depth_map::DepthReading;
 use crate::points::images::RgbDepth;
@@ -19,6 +20,8 @@ pub enum Source {
     File(PathBuf),
     /// Pictures.
     Pictures(PictureFiles),
+    /// Views from several places.
+    Views(ViewFiles),
 }
 
 /// Pictures, and where they stand.
@@ -52,6 +55,7 @@ impl Source {
     pub fn path(&self) -> &Path {
         match self {
             Self::File(path) => path,
+            Self::Views(views) => &views.path,
             Self::Pictures(pictures) => pictures.files.first().map_or(Path::new(""), PathBuf::as_path),
         }
     }
@@ -110,7 +114,7 @@ impl PictureFiles {
                 sorted.sort_by(|a, b| b.total_cmp(a));
                 lists.iter_mut().zip(sorted).for_each(|(points, wavelength)| put(points, wavelength));
             }
-            Object::Scene(_) => {}
+            Object::Scene(_) | Object::Views(_) => {}
         }
         Ok(object)
     }

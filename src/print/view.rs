@@ -6,12 +6,13 @@ use super::manifest::{Manifest, NOT_THE_INPUT, Settings};
 use super::plate::Plate;
 use super::preview::{Preview, PreviewSettings, preview};
 use super::source::{PictureFiles, Source};
+use super::view_files::ViewFiles;
 use crate::error::{Error, Result};
 use crate::points::colour::Lasers;
 use crate::progress::Progress;
 use crate::reconstruction::metrics::{Likeness, blocks, likeness};
 use crate::reconstruction::{ColorPicture, Picture, Scale, write_rgb_png};
-use crate::segments::{Object, PlacedScene};
+use crate::segments::{Object, PlacedScene, PlacedViews};
 use glam::DVec3;
 use serde::Serialize;
 use std::path::Path;
@@ -107,7 +108,7 @@ impl PlateView {
         Ok(view)
     }
 
-    fn luminance(&self) -> Picture {
+    pub(super) fn luminance(&self) -> Picture {
         self.color.as_ref().map_or_else(|| self.gray.picture.clone(), ColorPicture::luminance)
     }
 
@@ -193,6 +194,12 @@ impl PlateView {
                 };
                 Ok((traced(&scene, self.report.eye, &self.gray, plate.seed, progress)?, scene.white()))
             }
+            (Source::Views(ViewFiles { path, .. }), None) if self.settings.views().is_some() => {
+                let views = ViewFiles { path: path.clone(), reading: self.settings.views().unwrap_or_default() };
+                self.settings.check_views(&views)?;
+                let placed = views.placed(plate, &plate.segments()?)?;
+                Ok((printed(&placed, self.report.eye, &self.gray), 1.0))
+            }
             (of, _) => Err(Error::input(of.path(), NOT_THE_INPUT)),
         }
     }
@@ -220,6 +227,18 @@ impl PlateView {
         }
         Ok(alike)
     }
+}
+
+/// The picture that an eye at `eye` [m] should see of printed views where a preview stands.
+fn printed(views: &PlacedViews, eye: [f64; 3], seen: &Preview) -> ColorPicture {
+    let (width, height) = (seen.picture.width, seen.picture.height);
+    let at = |i: usize, count: usize, half: f64| half * ((2 * i + 1) as f64 / count as f64 - 1.0);
+    let cell = |i: usize| {
+        let x = seen.center[0] + at(i % width, width, seen.half.x);
+        let y = seen.center[1] - at(i / width, height, seen.half.y);
+        [views.seen(DVec3::from_array(eye), DVec3::new(x, y, seen.focus)); 3]
+    };
+    ColorPicture { width, height, rgb: (0..width * height).map(cell).collect() }
 }
 
 fn gray(picture: &Picture) -> ColorPicture {

@@ -1,7 +1,8 @@
 //! Per-segment views: a hologram plane divided into segments (hogels), each computed from the object as seen from there.
 //!
 //! [`Segments`] says how the plane is divided and what light leaves it. An [`Object`] is what it shows: a lit scene, of
-//! which every segment casts its own rays ([`PlacedScene`]), or points, the same from everywhere. The [`ObjectWave`] is
+//! which every segment casts its own rays ([`PlacedScene`]), views of one that others made ([`PlacedViews`]), or points, the same from
+//! everywhere. The [`ObjectWave`] is
 //! what reaches the plane from it: for a panel as a whole, for a plate rectangle by rectangle.
 //!
 //! From the few degrees that a panel sends light into, a viewer sees mirrors, gloss and edges move a little as the head
@@ -30,10 +31,13 @@ mod scene;
 mod slit;
 #[cfg(test)]
 mod tests;
+mod views;
 mod wave;
 
 pub(crate) use object::is_cloud;
 pub use object::{Object, SceneOptions};
 pub use plane::{ObjectBand, Piece, PointPhase, Rect, Segments, Slit, Viewing};
 pub use scene::PlacedScene;
+pub use views::PlacedViews;
+pub(crate) use views::lattice;
 pub use wave::{ObjectWave, SegmentedField, Work};

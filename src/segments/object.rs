@@ -3,6 +3,7 @@
 use super::plane::Segments;
 use super::scene::PlacedScene;
 use super::slit::{LinePoint, Strip};
+use super::views::PlacedViews;
 use crate::error::{Error, Result};
 use crate::illumination::{Illumination, IlluminationSettings, Quality};
 use crate::points::colour::Lasers;
@@ -21,6 +22,8 @@ pub enum Object {
     ColorPoints([Vec<PointSource>; 3]),
     /// A lit scene.
     Scene(Box<PlacedScene>),
+    /// Views from places before the plane.
+    Views(Box<PlacedViews>),
 }
 
 /// What of a scene's file is taken, and how it is lit.
@@ -152,7 +155,7 @@ impl Object {
     /// The points of each laser, or of one; none of a scene.
     pub(crate) fn clouds(&self) -> &[Vec<PointSource>] {
         match self {
-            Self::Scene(_) => &[],
+            Self::Scene(_) | Self::Views(_) => &[],
             Self::Points(points) => std::slice::from_ref(points),
             Self::ColorPoints(points) => points,
         }
@@ -160,8 +163,10 @@ impl Object {
 
     /// Lowest and highest z of what shines [m]; of a scene, of all that is in it.
     pub fn depths(&self) -> [f64; 2] {
-        if let Self::Scene(scene) = self {
-            return scene.depths;
+        match self {
+            Self::Scene(scene) => return scene.depths,
+            Self::Views(views) => return views.depths(),
+            Self::Points(_) | Self::ColorPoints(_) => {}
         }
         let depths = self.clouds().iter().flatten().map(|p| p.position.z);
         depths.fold([f64::INFINITY, f64::NEG_INFINITY], |d, z| [d[0].min(z), d[1].max(z)])
@@ -171,6 +176,7 @@ impl Object {
     pub(super) fn points(&self, plane: &Segments, segment: [i64; 2], progress: &Progress) -> Result<Vec<PointSource>> {
         let points = match self {
             Self::Scene(scene) => return scene.points(plane, segment, progress),
+            Self::Views(views) => return Ok(views.points(plane, segment)),
             Self::Points(points) | Self::ColorPoints([points, ..]) => points,
         };
         let (band, pitch) = (&plane.band, [plane.grid.pitch_x, plane.grid.pitch_y]);
@@ -196,6 +202,7 @@ impl Object {
     ) -> Result<Vec<LinePoint>> {
         let points = match self {
             Self::Scene(scene) => return scene.line_points(plane, segment, strip, progress),
+            Self::Views(_) => return Err(Error::parameter("plate", "has a slit; views are for a plate without one")),
             Self::Points(points) => points,
             Self::ColorPoints(points) => &points[strip.laser().unwrap_or(0)],
         };

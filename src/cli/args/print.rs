@@ -16,11 +16,15 @@ use std::path::PathBuf;
 pub(crate) struct PrintArgs {
     #[command(subcommand)]
     pub(crate) command: Option<PrintCommand>,
-    /// A scene (.gltf, .glb, .obj, .stl), seen truly from each segment of the plate; a point cloud (.ply, .xyz, .csv, .pcd, .las); or pictures.
+    /// A scene (.gltf, .glb, .obj, .stl), seen truly from each segment of the plate; a point cloud (.ply, .xyz, .csv, .pcd, .las); pictures; or
+    /// views.
     ///
     /// A picture (logo.png) stands at the plate's distance, or where it says (logo.png@-6mm), several behind each other
     /// (a.png@-4mm+b.png@-8mm), one with a depth map between --near and --far (rgb.png+depth.png). It fills the plate as the viewer
     /// sees it; what is clear or black in it lets what is behind through.
+    ///
+    /// Views from several places are a light field (`holodrive views`), or a folder of pictures of any program, named in their order from
+    /// left to right, --view-spacing apart.
     pub(crate) input: Option<PathBuf>,
     /// The plate: a built-in one by name (see `holodrive plates`), or a TOML file.
     #[arg(long, value_name = "NAME|FILE")]
@@ -45,6 +49,15 @@ pub(crate) struct PrintArgs {
     pub(crate) far: Option<f64>,
     #[command(flatten)]
     pub(crate) map: DepthMapArgs,
+    /// Folder of views: how far apart the places of neighbouring ones are.
+    #[arg(long, value_parser = units::length, value_name = "LENGTH")]
+    pub(crate) view_spacing: Option<f64>,
+    /// Folder of views: rows in which they stand, the highest first [default: 1, parallax from left to right].
+    #[arg(hide_short_help = true, long, value_name = "N")]
+    pub(crate) view_rows: Option<usize>,
+    /// Views in one row: the height from which they are seen [default: a tenth of their distance].
+    #[arg(hide_short_help = true, long, value_parser = units::length, value_name = "LENGTH")]
+    pub(crate) view_height: Option<f64>,
     /// Folder for the plate. One that was begun with the same settings is gone on with; one of others is refused.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,

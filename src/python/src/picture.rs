@@ -103,9 +103,7 @@ impl Picture {
     fn save(&self, py: Python<'_>, path: PathBuf, white: Option<f32>) -> PyResult<()> {
         ends_with(py, &path, &["png", "npy", "mat", "h5", "hdf5", "tif", "tiff"])?;
         let scale = scale(py, white)?;
-        run(py, None, |_| {
-            self.seen.write(&path, self.lasers.as_ref(), self.seen.white(scale), &self.view, self.half)
-        })
+        run(py, None, |_| self.seen.write(&path, self.lasers.as_ref(), self.seen.white(scale), &self.view, self.half))
     }
 
     /// The picture for notebooks.
