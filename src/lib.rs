@@ -31,7 +31,7 @@
 //! # Ok::<(), holodrive::Error>(())
 //! ```
 //!
-//! More stand in `tests/examples`. Data goes one way, and each step hands on one type:
+//! More stand in [`guide::rust`], with the features and what is good to know. Data goes one way, and each step hands on one type:
 //!
 //! ```text
 //! glTF ──scene──▶ Scene ──illumination──▶ light on surfaces ──points──▶ PointCloud ──hologram──▶ Field

@@ -47,11 +47,14 @@ pub fn exposures(setup: &Setup, settings: &Settings, path_eye: Option<DVec3>) ->
     }
 }
 
+/// Distance beyond which points were meant to stand elsewhere [m]: a cloud in millimetres.
+const FAR: f64 = 20.0;
+
 /// Points → field of one exposure on the panel, by the engine that the planner chooses; `None` for one of three lasers
 /// that has no light.
 ///
 /// # Errors
-/// As [`hologram::plan`] and [`hologram::compute`].
+/// As [`PointCloud::check`], [`hologram::plan`] and [`hologram::compute`].
 pub fn field(
     cloud: &PointCloud,
     exposure: &Exposure,
@@ -59,12 +62,19 @@ pub fn field(
     settings: &HologramSettings,
     progress: &Progress,
 ) -> Result<Option<Computed>> {
+    cloud.check()?;
     let points = exposure.points(cloud);
     if matches!(exposure.share, Share::Laser { .. }) && points.iter().all(|p| p.amplitude == 0.0) {
         return Ok(None);
     }
     let plan = hologram::plan(&points, &setup.grid, exposure.wavelength, settings)?;
-    hologram::compute(&points, &setup.grid, exposure.wavelength, &plan, progress).map(Some)
+    let mut computed = hologram::compute(&points, &setup.grid, exposure.wavelength, &plan, progress)?;
+    if points.is_empty() {
+        computed.report.warnings.push("there are no points: the field is dark".into());
+    } else if points.iter().all(|p| p.position.z.abs() > FAR) {
+        computed.report.warnings.push(format!("all points stand more than {FAR} m from the panel; look at their unit"));
+    }
+    Ok(Some(computed))
 }
 
 /// Field → frame of drive levels; `origin` goes into its metadata, and its depths tell iterations where to look.

@@ -6,17 +6,18 @@ use super::holograms::{Maker, add_exposure, report_encoding};
 use super::load::{Input, Points, input};
 use super::report::{Report, count, seconds, step};
 use super::resolve;
-use crate::Result;
 use crate::encode::view::Viewed;
 use crate::encode::{EncodeReport, Encoding, ViewEncoding};
-use crate::light_field::{LightField, LightSource, Retina, Viewer};
+use crate::light_field::{LightField, LightSource, Retina, ViewSequence, Viewer};
 use crate::panel::{Frame, Origin, Setup};
 use crate::pipeline::{self, Bench, Settings};
-use crate::points::{Channel, Exposure, ScenePoints, Share};
+use crate::points::{Channel, Exposure, LitScene, ScenePoints, Share};
 use crate::progress::Progress;
 use crate::reconstruction::{Colour, Seeing};
 use crate::units::show_length;
+use crate::{Error, Result};
 use glam::DVec3;
+use image::ImageFormat;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -79,7 +80,9 @@ pub(super) fn views(args: &ViewsArgs) -> Result<Report> {
         viewer: resolve::viewer(&args.viewer, Some(&args.placement), file.as_ref()),
         ..Settings::default()
     };
-    resolve::check_viewer(&settings.viewer, &setup)?;
+    if args.sequence.is_none() {
+        resolve::check_viewer(&settings.viewer, &setup)?;
+    }
     let points;
     let content = match file {
         Some(file) => Content::Views(file),
@@ -89,11 +92,61 @@ pub(super) fn views(args: &ViewsArgs) -> Result<Report> {
             Content::Points(&points)
         }
     };
+    if let Some(count) = args.sequence {
+        let Content::Points(Points { scene: Some((lit, points)), .. }) = content else {
+            return Err(Error::parameter("sequence", "is made of a scene: views in files and points stay as they are"));
+        };
+        sequence(args, count, lit, points, (&setup, &settings), &bar.progress, &mut report)?;
+        return Ok(report);
+    }
     let light = light_field(&content, &setup, &settings, &bar.progress, &mut report)?;
     bar.progress.check()?;
     light.write(&args.output)?;
     report.output("light field", &args.output);
     Ok(report)
+}
+
+/// `views --sequence`: numbered pictures from places in a row.
+fn sequence(
+    args: &ViewsArgs,
+    count: usize,
+    lit: &LitScene,
+    points: &ScenePoints,
+    (setup, settings): (&Setup, &Settings),
+    progress: &Progress,
+    report: &mut Report,
+) -> Result<()> {
+    let window = points.view.placing.window;
+    let size = args.size.unwrap_or((1280, (1280.0 * window.y / window.x).round() as usize));
+    let wanted = ViewSequence {
+        count,
+        width: settings.viewer.eye_box.x,
+        size,
+        rays: args.pixel_rays,
+        format: if args.kind == "png" { ImageFormat::Png } else { ImageFormat::Tiff },
+    };
+    if wanted.width == 0.0 {
+        return Err(Error::parameter("eye-box", "says how far the sequence goes from left to right: --eye-box 300mm"));
+    }
+    let begin = Instant::now();
+    let how = settings.light_field(setup.lasers.is_some());
+    let did = wanted.write(lit, points, &settings.viewer, &how, &args.output, progress)?;
+    let what = format!(
+        "{} views of {} × {} pixels, {} apart, {} before a window of {} × {}; {} to {}",
+        super::report::count(did.views),
+        size.0,
+        size.1,
+        show_length(did.spacing),
+        show_length(did.distance),
+        show_length(did.window[0]),
+        show_length(did.window[1]),
+        did.files[0],
+        did.files[1]
+    );
+    report.line(step("sequence", begin.elapsed().as_secs_f64(), what));
+    report.value("sequence", &did);
+    report.output("sequence", &args.output);
+    Ok(())
 }
 
 impl Maker<'_> {

@@ -69,7 +69,13 @@ fn resolved(args: &PrintArgs) -> Result<PrintSettings> {
         folder => folder.clone().unwrap_or_default(),
     };
     let light = &args.light;
-    let asked = Asked { size: args.size, pitch: args.pitch, binarisation: args.binarisation, phase: args.phase };
+    let asked = Asked {
+        size: args.size,
+        pitch: args.pitch,
+        binarisation: args.binarisation,
+        phase: args.phase,
+        segment: args.segment,
+    };
     let plate = Plate::find(path, &asked)?;
     let input = plate_source::source(args, &input, &plate)?;
     Ok(PrintSettings {

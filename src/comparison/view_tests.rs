@@ -153,3 +153,41 @@ fn an_edge_out_of_focus_is_blurred_as_in_the_light_field() {
     let sharp = width(&profile(&found.seen[1]));
     assert!(sharp < 1.3 * 95e-6, "{sharp}");
 }
+
+/// Phases of a frame that showed something else are no better a start than none, and are not taken: on a panel small enough for a test.
+#[test]
+fn going_on_from_another_picture_is_no_worse_than_beginning_anew() {
+    let progress = Progress::new();
+    let setup = Setup::new(PanelProfile::phase(640, 400, 8e-6, 8, 632.8e-9).expect("panel"), None).expect("setup");
+    let viewer = Viewer::default();
+    let retina = Retina::of(&viewer, &setup.grid, setup.wavelength).expect("retina");
+    let half = 0.5 * DVec2::new(setup.grid.extent_x(), setup.grid.extent_y());
+    let (eyes, window) = (retina.eyes(&viewer).expect("eyes"), retina.window(half).expect("window"));
+    // Bars across that turn.
+    let light = |turn: f64| {
+        let bars = move |p: DVec2| {
+            if (p.rotate(DVec2::from_angle(turn)).x / 0.9e-3).rem_euclid(1.0) < 0.5 { 1.0 } else { 0.05 }
+        };
+        let layers = [Layer::new(NEAR, bars, |_| 1.0)];
+        LightField::of_layers(&layers, eyes, window).expect("views")
+    };
+    let exposures = pipeline::exposures(&setup, &pipeline::Settings::default(), None);
+    let found = |turn: f64, iterations: Option<usize>, start: &[Vec<f32>]| {
+        let view = ViewEncoding { iterations, ..ViewEncoding::default() };
+        let found =
+            pipeline::views(&light(turn), &viewer, &exposures, &setup, &view, start, &progress).expect("frames");
+        found.into_iter().flatten().next().expect("one laser")
+    };
+    let before = found(0.0, Some(12), &[]);
+    let last = |viewed: &crate::encode::view::Viewed| *viewed.report.psnr.last().expect("checked");
+    for (turn, steps) in [(0.8, Some(6)), (0.01, Some(6)), (0.8, None)] {
+        let (warm, cold) = (found(turn, steps, &before.wishes), found(turn, steps, &[]));
+        println!("turned by {turn}: {:.1?} dB, anew {:.1?} dB", warm.report.psnr, cold.report.psnr);
+        assert!(last(&warm) > last(&cold) - 0.3, "turned by {turn}: {} dB, anew {} dB", last(&warm), last(&cold));
+        if turn > 0.1 {
+            assert_eq!(warm.report.iterations, cold.report.iterations);
+        } else {
+            assert!(warm.report.psnr[0] > cold.report.psnr[0] + 3.0, "a small move is gone on with");
+        }
+    }
+}

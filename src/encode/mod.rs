@@ -71,6 +71,7 @@ pub use options::EncodeOptions;
 pub use view::ViewEncoding;
 
 use crate::error::{Error, Result};
+use crate::field::grid::light;
 use crate::field::{Complex32, Field};
 use crate::names::Named;
 use crate::panel::simulated::illuminate;
@@ -148,7 +149,8 @@ pub struct EncodeReport {
     /// N pixels and the wanted field u.
     pub efficiency: f64,
     /// Relative error of the field within the encoding's band after the best complex factor: √(1 − |⟨u, g⟩|²/(⟨u, u⟩
-    /// ⟨g, g⟩)). It covers the border too, where the sharp band rings.
+    /// ⟨g, g⟩)). It covers the border too, where the sharp band rings. NaN for frames that are made for an eye: they have no wanted
+    /// field, see [`ViewReport::psnr`].
     pub field_error: f64,
     /// Share of samples whose amplitude passed the normalisation and was clipped.
     pub clipped: f64,
@@ -208,6 +210,9 @@ pub fn encode(
     }
     let profile = amplitude.as_ref().unwrap_or(profile);
     let grid = profile.grid()?;
+    profile.checked()?;
+    field.check_samples()?;
+    light(field.wavelength)?;
     crate::panel::drive::fit(field.grid, profile)?;
     let made = pattern_for(field, settings, profile, progress)?;
     progress.start("drive levels", grid.height as u64);

@@ -42,14 +42,24 @@ impl<T: bytemuck::Zeroable> Field<T> {
     }
 }
 
+impl<T> Field<T> {
+    /// Refuses samples whose number is not the grid's.
+    pub(crate) fn check_samples(&self) -> Result<()> {
+        let Self { grid, samples, .. } = self;
+        if samples.len() == grid.len() {
+            return Ok(());
+        }
+        let what = format!("{} samples for a grid of {}×{}", samples.len(), grid.width, grid.height);
+        Err(Error::parameter("field", what))
+    }
+}
+
 impl Field<f32> {
     /// A field from its samples; refused when their number is not the grid's.
     pub fn new(grid: Grid, wavelength: f64, samples: Vec<Complex32>) -> Result<Self> {
-        if samples.len() != grid.len() {
-            let what = format!("{} samples for a grid of {}×{}", samples.len(), grid.width, grid.height);
-            return Err(Error::parameter("field", what));
-        }
-        Ok(Self { grid, wavelength, samples })
+        let field = Self { grid, wavelength, samples };
+        field.check_samples()?;
+        Ok(field)
     }
 
     /// The wave exp(iφ) of these phases [rad]; refused when their number is not the grid's.

@@ -112,7 +112,7 @@ impl Stored {
         };
         let wavelength = wavelength.or(beside.map(|m| m.wavelength)).ok_or_else(|| missing("wavelength"))?;
         let pitch = pitch.or(beside.map(|m| m.pitch)).ok_or_else(|| missing("pitch"))?;
-        grid::positive("wavelength", wavelength).map_err(|e| Error::input(path, e.to_string()))?;
+        grid::light(wavelength).map_err(|e| Error::input(path, e.to_string()))?;
         let center = beside.map_or([0.0; 2], |m| m.center);
         let grid = Grid::new(self.width, self.height, pitch[0], pitch[1])?.centered_at(center);
         let samples = match &self.samples {

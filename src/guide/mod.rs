@@ -18,6 +18,10 @@ pub mod lab {}
 #[doc = include_str!("python.md")]
 pub mod python {}
 
+/// The library: an SLM in a test, points of one's own, features.
+#[doc = include_str!("rust.md")]
+pub mod rust {}
+
 /// Plates for printers of every kind.
 #[doc = include_str!("plates.md")]
 pub mod plates {}

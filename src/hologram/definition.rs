@@ -86,9 +86,9 @@ pub(crate) struct Optics {
 }
 
 impl Optics {
-    /// The definition's constants for a grid; refuses a wavelength that is not positive and finite.
+    /// The definition's constants for a grid; refuses a wavelength that no laser has.
     pub(crate) fn new(grid: &Grid, wavelength: f64) -> Result<Self> {
-        grid::positive("wavelength", wavelength)?;
+        grid::light(wavelength)?;
         let pitch = grid.pitch();
         Ok(Self { wavelength, taper: pitch.map(|p| Taper::new(p, wavelength)), pitch })
     }

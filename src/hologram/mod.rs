@@ -5,7 +5,7 @@
 //! why, in what time and memory; [`compute`] runs it and measures what error came of it.
 //!
 //! ```
-//! use glam::DVec3;
+//! use holodrive::glam::DVec3;
 //! use holodrive::field::{Grid, relative_error};
 //! use holodrive::hologram::{Cull, HologramSettings, compute, oracle, plan};
 //! use holodrive::points::PointSource;

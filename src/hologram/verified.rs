@@ -107,7 +107,11 @@ pub fn compute(
             measured.of_power
         ));
     }
+    // What was tried afterwards nobody has asked for.
     let mut reason = done.reason.clone();
+    if tries.len() > 1 && first.settings.method.is_none() {
+        reason = reason.replace(" as asked for", "");
+    }
     for (method, limit) in &tries[..tries.len() - 1] {
         reason += &format!("; {} measured {} for {asked:.0e} asked, so it was done again", method.name(), show(*limit));
     }

@@ -67,6 +67,7 @@ impl LightField {
         progress: &Progress,
     ) -> Result<(Self, LightFieldReport)> {
         settings.check()?;
+        cloud.check()?;
         let begin = Instant::now();
         let mono = cloud.rgb.is_none() || settings.channel.is_some();
         let mut field = Self::black(eyes, window, if mono { 1 } else { 3 })?;

@@ -5,7 +5,7 @@
 //! scene of tests and comparisons.
 //!
 //! ```
-//! use glam::{DVec2, DVec3};
+//! use holodrive::glam::{DVec2, DVec3};
 //! use holodrive::field::Grid;
 //! use holodrive::light_field::{EyeGrid, LightField, Viewer, layers};
 //!

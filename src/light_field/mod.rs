@@ -19,7 +19,7 @@
 //! and written to files that other programs read, and read from them ([`mod@file`], [`folder`]).
 //!
 //! ```
-//! use glam::{DVec2, DVec3};
+//! use holodrive::glam::{DVec2, DVec3};
 //! use holodrive::field::Grid;
 //! use holodrive::light_field::{EyeGrid, LightField, LightFieldSettings, Viewer};
 //! use holodrive::points::{LitScene, SceneSettings};
@@ -59,11 +59,13 @@ pub(crate) mod retina;
 mod scene;
 mod settings;
 mod source;
+mod view_sequence;
 
 pub use layers::Layer;
 pub use retina::{Look, Retina};
 pub use settings::{LightFieldReport, LightFieldSettings};
 pub use source::LightSource;
+pub use view_sequence::{ViewSequence, ViewSequenceReport};
 
 use crate::error::{Error, Result};
 use crate::field::{Grid, grid};

@@ -5,6 +5,7 @@
 use super::drive_curve::Modulation;
 use super::frame::{FrameMetadata, Illumination};
 use super::profile::{PanelKind, PanelProfile};
+use crate::error::Error;
 use crate::field::grid::{PITCHES, light};
 use crate::units::WAVELENGTHS;
 
@@ -22,6 +23,14 @@ const LONGEST_TIME: f64 = 3600.0;
 const HIGHEST_RATE: f64 = 1e9;
 
 impl PanelProfile {
+    /// Refuses fields that were set to what no panel has: what reads profiles, and whatever computes with one, asks this.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`], which names the first.
+    pub fn checked(&self) -> Result<(), Error> {
+        self.check().map_err(|what| Error::parameter("panel", format!("{}: {what}", self.name)))
+    }
+
     /// The first number outside its domain, in words.
     pub(super) fn check(&self) -> Result<(), String> {
         let (width, height, bits) = (self.width, self.height, self.bits);

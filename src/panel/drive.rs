@@ -8,6 +8,7 @@ use super::wavefront::Wavefront;
 use super::{FringePattern, PhasePattern};
 use crate::error::{Error, Result};
 use crate::field::Grid;
+use crate::field::grid::light;
 use rayon::prelude::*;
 
 /// What a panel should show: phases or amplitudes.
@@ -74,10 +75,12 @@ pub struct Driven {
 /// The metadata says what was applied; its encoding and origin are left for the caller to fill.
 ///
 /// # Errors
-/// [`Error::Parameter`] when pattern and panel do not fit in size, pitch or modulation, or when a wish is not finite;
-/// [`Error::Calibration`] when the correction or the curve does not fit.
+/// [`Error::Parameter`] when pattern and panel do not fit in size, pitch or modulation, when a wish is not finite, and for a
+/// profile as [`PanelProfile::checked`]; [`Error::OutOfRange`] for a wavelength that no laser has; [`Error::Calibration`] when the correction or the curve does not fit.
 pub fn drive(pattern: &Pattern, correction: Option<&Wavefront>, profile: &PanelProfile) -> Result<Driven> {
     let (grid, wavelength) = (pattern.grid(), pattern.wavelength());
+    profile.checked()?;
+    light(wavelength)?;
     fit(grid, profile)?;
     if pattern.modulation() != profile.modulation() {
         let what = match profile.modulation() {

@@ -3,6 +3,7 @@
 use super::drive_curve::Modulation;
 use super::profile::PanelProfile;
 use crate::error::{Error, Result};
+use crate::field::grid::light;
 use crate::field::npy::CONVENTION;
 use crate::propagation::Aperture;
 use serde::{Deserialize, Serialize};
@@ -26,7 +27,8 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// A frame from its levels; refused when their number or one of them does not fit the profile.
+    /// A frame from its levels; refused when their number or one of them does not fit the profile, or when no
+    /// laser has the wavelength [m].
     pub fn new(profile: &PanelProfile, wavelength: f64, levels: Vec<u16>) -> Result<Self> {
         let (width, height) = (profile.width, profile.height);
         if levels.len() != width * height {
@@ -44,7 +46,24 @@ impl Frame {
             );
             return Err(Error::parameter("frame", what));
         }
+        light(wavelength)?;
         Ok(Self { width, height, bits: profile.bits, levels, metadata: FrameMetadata::new(profile, wavelength) })
+    }
+
+    /// Refuses levels that are not as many as the pixels, or that do not fit their bits.
+    pub(super) fn check_levels(&self) -> Result<()> {
+        let Self { width, height, bits, levels, .. } = self;
+        if levels.len() != width * height {
+            return Err(Error::parameter("frame", format!("{} levels for {width}×{height} pixels", levels.len())));
+        }
+        match levels.iter().position(|&level| u32::from(level) >> bits != 0) {
+            None => Ok(()),
+            Some(i) => {
+                let (level, column, row) = (levels[i], i % width, i / width);
+                let what = format!("level {level} at column {column}, row {row} does not fit into {bits} bits");
+                Err(Error::parameter("frame", what))
+            }
+        }
     }
 }
 

@@ -18,7 +18,11 @@ const KEYWORD: &str = "holodrive";
 
 impl Frame {
     /// Writes a gray PNG of the levels with the metadata; the file appears whole or not at all.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for levels that are not as many as the pixels or do not fit their bits; [`Error::Io`].
     pub fn write(&self, path: &Path) -> Result<()> {
+        self.check_levels()?;
         let (depth, bytes) = match self.bits {
             0 | 1 => (png::BitDepth::One, self.packed_rows(1)),
             2 => (png::BitDepth::Two, self.packed_rows(2)),

@@ -50,6 +50,7 @@ impl Setup {
     /// # Errors
     /// As [`PanelProfile::grid`].
     pub fn new(profile: PanelProfile, wavelength: Option<f64>) -> Result<Self> {
+        profile.checked()?;
         let (grid, wavelength) = (profile.grid()?, wavelength.unwrap_or(profile.default_wavelength()));
         light(wavelength)?;
         Ok(Self { profile, grid, wavelength, lasers: None, correction: Correction::Profile })

@@ -14,6 +14,7 @@ use super::regional::PixelCurve;
 use super::response::Response;
 use super::wavefront::Wavefront;
 use crate::error::{Error, Result};
+use crate::field::grid;
 use crate::field::{Complex32, Complex64, Fft2, Field, Grid};
 use crate::progress::Progress;
 use rayon::prelude::*;
@@ -93,6 +94,8 @@ impl Default for Faults {
 pub fn simulate(frame: &Frame, settings: &Simulation, progress: &Progress) -> Result<Field> {
     let profile = &frame.metadata.panel;
     let wavelength = frame.metadata.wavelength;
+    profile.checked()?;
+    grid::light(wavelength)?;
     let grid = profile.grid()?;
     check(frame, grid, settings)?;
     let faults = &settings.faults;
@@ -171,10 +174,11 @@ pub fn simulate_sequence(
 
 fn check(frame: &Frame, grid: Grid, settings: &Simulation) -> Result<()> {
     let faults = &settings.faults;
-    if frame.levels.len() != grid.len() || (frame.width, frame.height) != (grid.width, grid.height) {
+    if (frame.width, frame.height) != (grid.width, grid.height) {
         let what = format!("{}×{} levels; its panel has {}×{}", frame.width, frame.height, grid.width, grid.height);
         return Err(Error::parameter("frame", what));
     }
+    frame.check_levels()?;
     if !(1..=16).contains(&settings.subsamples) {
         return Err(Error::out_of_range("subsamples", settings.subsamples, "must be 1 … 16"));
     }

@@ -28,7 +28,7 @@ pub struct Settings {
 
 impl Settings {
     /// How the views of a light field are made with these settings: in one channel for one laser, in colour for three.
-    pub(super) fn light_field(&self, lasers: bool) -> LightFieldSettings {
+    pub(crate) fn light_field(&self, lasers: bool) -> LightFieldSettings {
         LightFieldSettings {
             channel: (!lasers).then_some(self.channel),
             bounces: self.scene.trace.bounces,
@@ -66,7 +66,8 @@ pub struct Outcome {
     pub points: ScenePoints,
     /// Field and frame of each exposure; `None` for one of three lasers that has no light.
     pub holograms: Vec<Option<Hologram>>,
-    /// What is seen of them on the simulated bench with the whole panel as aperture, with figures.
+    /// What is seen of them on the simulated bench with the whole panel as aperture, with figures: of a field's encodings. A frame for
+    /// an eye ([`Encoding::View`]) shows nothing there that it was made for: of it look at `seen`.
     pub pictures: Gallery,
     /// What the viewer sees of them through the pupil, with figures.
     pub seen: SeenGallery,

@@ -145,7 +145,21 @@ impl PointCloud {
         }
         points
     }
-    /// Lowest and highest z [m]; `None` for an empty cloud.
+    /// Refuses colours that are not as many as the points.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`](crate::Error::Parameter).
+    pub fn check(&self) -> crate::Result<()> {
+        match &self.rgb {
+            Some(rgb) if rgb.len() != self.points.len() => {
+                let what = format!("{} colours for {} points", rgb.len(), self.points.len());
+                Err(crate::Error::parameter("rgb", what))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Lowest and highest z, the farthest and the nearest light [m]; `None` for an empty cloud.
     pub fn depth_range(&self) -> Option<(f64, f64)> {
         self.points.iter().map(|p| p.position.z).fold(None, |range, z| match range {
             None => Some((z, z)),

@@ -121,6 +121,10 @@ fn asked(name: &str, plate: &Plate) -> Option<Vec<String>> {
         asked.phase = Some(plate.view.phase);
         flags.extend(["--phase".to_owned(), PointPhase::name(&plate.view.phase).to_owned()]);
     }
+    if !same_plate(&Plate::find(name, &asked).ok()?, plate) {
+        asked.segment = Some(plate.segment);
+        flags.extend(["--segment".to_owned(), plate.segment.to_string()]);
+    }
     same_plate(&Plate::find(name, &asked).ok()?, plate).then_some(flags)
 }
 
@@ -144,10 +148,11 @@ mod tests {
             pitch: Some(0.5e-6),
             binarisation: Some(Binarisation::DirectSearch),
             phase: Some(PointPhase::Path),
+            segment: Some(512),
         };
         let options = SceneOptions { bounces: 4, white: Some(f32::MAX), ..SceneOptions::default() };
         let other = of(plate(&asked), options);
-        let flags = "--pitch 500nm --size 4000x6000 --binarisation direct-search --phase path --bounces 4 --white none";
+        let flags = "--pitch 500nm --size 4000x6000 --binarisation direct-search --phase path --segment 512 --bounces 4 --white none";
         assert_eq!(other, format!("holodrive print cornell.gltf --plate chrome-1um {flags} -o 'my plate'"));
         let mut own = plate(&Asked::default());
         own.seed = 7;

@@ -156,13 +156,13 @@ impl Plate {
             return at.refuse("pulse-width makes its fringe from u·r* itself; take quantity = \"bipolar\"");
         }
         let tile = file.tile.unwrap_or(2048);
-        let mut segment = file.segment.unwrap_or(1024.min(tile));
+        let mut segment = asked.segment.or(file.segment).unwrap_or(1024.min(tile));
         let mut layout =
             FileLayout { mirror: file.mirror, rotation: file.rotation, guard: file.guard, marks: file.marks, tile };
         if asked.size.is_some() || file.tile.is_none() {
             // A plate that is made smaller than its file says, or whose file says no tiles, gets some that fit.
             layout.tile = tile.min(width.min(height) / 64 * 64).max(64);
-            segment = segment.min(layout.tile);
+            segment = asked.segment.unwrap_or(segment.min(layout.tile));
         }
         let tile = layout.tile;
         let reference = match &file.reference {

@@ -53,6 +53,8 @@ pub struct Asked {
     pub binarisation: Option<Binarisation>,
     /// Where the points of a scene stand, and in which phases.
     pub phase: Option<PointPhase>,
+    /// Pixels of a segment's side.
+    pub segment: Option<u64>,
 }
 
 /// The key `size`: pixels, two lengths, or both in one text.

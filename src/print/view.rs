@@ -132,9 +132,13 @@ impl PlateView {
         self.pupil
     }
 
-    /// Names of the files that the plate was made of.
+    /// Names of the files that the plate was made of, or of the folder of its views.
     pub(super) fn inputs(&self) -> Vec<String> {
-        self.settings.inputs.iter().map(|input| input.name.clone()).collect()
+        match self.settings.views() {
+            // Their folder stands for all of them.
+            Some(reading) => vec![reading.name],
+            None => self.settings.inputs.iter().map(|input| input.name.clone()).collect(),
+        }
     }
 
     /// Texts of a picture's file.

@@ -163,6 +163,7 @@ impl<T: FftNum> Propagator<T> {
     ) -> Result<Field<T>> {
         assert_eq!(field.grid, self.input, "the field stands on the planned grid");
         grid::finite("distance", distance)?;
+        field.check_samples()?;
         progress.check()?;
         let wavelength = field.wavelength;
         let zero = Complex::new(T::zero(), T::zero());

@@ -56,7 +56,7 @@ impl<T: FftNum> ScaledPropagator<T> {
     /// [`Error::Parameter`] for a wavelength that is not positive, or a distance that is not finite; [`Error::Memory`]
     /// when the spectra pass the budget.
     pub fn new(input: Grid, output: Grid, wavelength: f64, distance: f64, settings: Settings) -> Result<Self> {
-        grid::positive("wavelength", wavelength)?;
+        grid::light(wavelength)?;
         grid::finite("distance", distance)?;
         let guard = if settings.band_limit { GUARD * (wavelength * distance.abs()).sqrt() } else { 0.0 };
         let counts =
@@ -117,6 +117,7 @@ impl<T: FftNum> ScaledPropagator<T> {
         progress: &Progress,
     ) -> Result<Field<T>> {
         assert_eq!((field.grid, field.wavelength), (self.input, self.wavelength), "the field is the planned one");
+        field.check_samples()?;
         progress.check()?;
         let Self { wavelength, distance, .. } = *self;
         let axes = [self.axis(0), self.axis(1)];

@@ -4,6 +4,9 @@ use super::{Picture, Scale};
 use crate::field::{Complex32, Complex64};
 
 /// Peak signal-to-noise ratio of values in [0, 1]: −10·log₁₀(mean squared difference) [dB]; infinite when equal.
+///
+/// # Panics
+/// When their sizes differ, as all comparisons here do.
 pub fn psnr(a: &[f32], b: &[f32]) -> f64 {
     assert_eq!(a.len(), b.len(), "pictures of one size are compared");
     let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum();
@@ -13,6 +16,9 @@ pub fn psnr(a: &[f32], b: &[f32]) -> f64 {
 /// Mean structural similarity of values in [0, 1]: Gaussian window of 11 × 11, σ = 1.5, K₁ = 0.01, K₂ = 0.03, over
 /// the windows that lie wholly inside (Wang, Bovik, Sheikh & Simoncelli, *IEEE Trans. Image Processing* 13 (2004),
 /// eq. 13). Pictures smaller than the window give the value of one window over all of them.
+///
+/// # Panics
+/// When `a` or `b` has not `width × height` values.
 pub fn ssim(a: &[f32], b: &[f32], width: usize, height: usize) -> f64 {
     let windows = ssim_windows(a, b, width, height);
     windows.iter().sum::<f64>() / windows.len() as f64
@@ -90,6 +96,9 @@ pub(super) fn least_squares<'a>(
 }
 
 /// Compares a reconstruction with its target, both linear, after one least-squares gain; white is `white`.
+///
+/// # Panics
+/// When their sizes differ.
 pub fn likeness(seen: &Picture, target: &Picture, white: f32) -> Likeness {
     assert!(seen.width == target.width && seen.height == target.height, "pictures of one size are compared");
     let gain = gain(seen, target, white);
@@ -133,6 +142,9 @@ pub fn uniformity(values: &[f32]) -> f64 {
 /// Normalised squared error of a wave field, min over complex factors c of Σ|c·seen − wanted|²/Σ|wanted|²; 0 … 1.
 ///
 /// A piston and the brightness are taken out by c; what is left is wrong in amplitude or phase somewhere.
+///
+/// # Panics
+/// When their sizes differ.
 pub fn field_error(seen: &[Complex32], wanted: &[Complex32]) -> f64 {
     assert_eq!(seen.len(), wanted.len(), "fields of one size are compared");
     let wide = |u: &Complex32| Complex64::new(u.re.into(), u.im.into());

@@ -6,7 +6,7 @@
 //! on the retina up to its scale, upright.
 //!
 //! ```
-//! use glam::{DVec2, DVec3};
+//! use holodrive::glam::{DVec2, DVec3};
 //! use holodrive::field::Grid;
 //! use holodrive::hologram::{HologramSettings, compute, plan};
 //! use holodrive::points::PointSource;
@@ -149,6 +149,7 @@ pub fn intensity(
     settings: &ViewSettings,
     progress: &Progress,
 ) -> Result<(Grid, Vec<f32>)> {
+    field.check_samples()?;
     let window = window(&field.grid, half)?;
     let seen = match *view {
         View::Plane { z } => Propagator::new(field.grid, window, settings.propagation)?.propagate_through(
@@ -255,6 +256,10 @@ pub fn all_in_focus(
     settings: &ViewSettings,
     progress: &Progress,
 ) -> Result<(Picture, usize)> {
+    if depths.len() != width * height {
+        let what = format!("{} for the {width}×{height} pixels of the picture", depths.len());
+        return Err(Error::parameter("depths", what));
+    }
     let known = depths.iter().flatten();
     let near = known.clone().fold(f64::NEG_INFINITY, |a, &z| a.max(z));
     let far = known.fold(f64::INFINITY, |a, &z| a.min(z));

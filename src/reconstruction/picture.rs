@@ -33,6 +33,9 @@ impl Picture {
     ///
     /// Each sample stands for its pixel's area and is shared among the cells that it touches by area, so the sum over
     /// the picture is the sum over the rectangle.
+    ///
+    /// # Panics
+    /// When there are fewer samples than the grid has.
     pub fn from_samples(grid: &Grid, samples: &[f32], half: DVec2, width: usize, height: usize) -> Self {
         let columns = overlaps(grid.width, |i| grid.x(i) - grid.center[0], grid.pitch_x, half.x, width);
         let rows = overlaps(grid.height, |i| grid.center[1] - grid.y(i), grid.pitch_y, half.y, height);

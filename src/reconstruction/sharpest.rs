@@ -6,7 +6,7 @@
 //! both sides of it; finer ones with more of the light follow about the best plane.
 
 use super::{Picture, View, ViewSettings, intensity};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::field::{Field, Grid};
 use crate::progress::Progress;
 use crate::propagation::resample;
@@ -33,8 +33,13 @@ pub struct Sharpest {
 /// the panel [m] on both sides of it.
 ///
 /// # Errors
-/// As [`intensity`].
+/// [`Error::Parameter`] for a range that is none; as [`intensity`].
 pub fn sharpest(field: &Field, range: [f64; 2], settings: &ViewSettings, progress: &Progress) -> Result<Sharpest> {
+    if !(range[0] > 0.0 && range[0] < range[1] && range[1].is_finite()) {
+        let what =
+            format!("[{}, {}] m must be the nearest and the farthest distance, both above zero", range[0], range[1]);
+        return Err(Error::parameter("range", what));
+    }
     // Of a small panel there is no light to spare.
     let part: usize = match field.grid.width.min(field.grid.height) {
         512.. => 4,

@@ -1,7 +1,7 @@
 //! One loop for one laser, three lasers and sub-frames: their lists of exposures are all that differs.
 
-use glam::DVec3;
 use holodrive::Result;
+use holodrive::glam::DVec3;
 use holodrive::panel::{Origin, PanelProfile, Setup};
 use holodrive::pipeline::{self, Settings};
 use holodrive::points::{Multiplexing, PointCloud, PointSource, SubFrames};

@@ -1,8 +1,8 @@
 //! Points of one's own, the field that they make on a panel, and its error against the exact sum.
 
-use glam::DVec3;
 use holodrive::Result;
 use holodrive::field::Grid;
+use holodrive::glam::DVec3;
 use holodrive::hologram::{self, HologramSettings, Method};
 use holodrive::points::PointSource;
 use holodrive::progress::Progress;

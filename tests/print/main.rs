@@ -327,6 +327,50 @@ fn plates_that_would_be_wrong_are_refused_in_a_line() {
     assert!((plan["object_angle"][0].as_f64().expect("angle").to_degrees() - 9.1).abs() < 0.1, "{plan}");
 }
 
+#[test]
+fn view_sequences_are_made_of_scenes_and_printed() {
+    let folder = tempfile::tempdir().expect("folder");
+    let f = folder.path();
+    prepare(f);
+    let sequence = ["views", "cornell", "--sequence", "3", "--size", "40x30", "-o", "seq"];
+    refused(f, &sequence, "--eye-box 300mm");
+    refused(f, &["views", "points.ply", "--sequence", "3", "--eye-box", "20mm", "-o", "seq"], "made of a scene");
+    let report = done(f, &[&sequence[..], &["--eye-box", "20mm"]].concat());
+    assert_eq!(report["sequence"]["spacing"].as_f64(), Some(0.01), "{report}");
+    let told: serde_json::Value =
+        serde_json::from_slice(&fs::read(f.join("seq/sequence.json")).expect("json")).expect("json");
+    assert_eq!((&told["views"], &told["files"][1]), (&serde_json::json!(3), &serde_json::json!("0003.tif")));
+    let pictures = [1, 2, 3].map(|k| image::open(f.join(format!("seq/000{k}.tif"))).expect("picture").to_luma8());
+    assert!(pictures.iter().all(|picture| picture.dimensions() == (40, 30)));
+    // The room stands behind the window and is seen through it: to who stands left the far wall is farther left in it than to who stands
+    // right. Each picture fits its neighbour best moved by some pixels that way, the middle one's rows at most half as far.
+    let fit = |a: &image::GrayImage, b: &image::GrayImage, by: i64| -> f64 {
+        let inside = |x: i64| (0..40).contains(&x);
+        let pairs = (0..30u32).flat_map(|y| (0..40i64).map(move |x| (x, y))).filter(|(x, _)| inside(x + by));
+        let differences = pairs.map(|(x, y)| {
+            f64::from(a.get_pixel(x as u32, y).0[0].abs_diff(b.get_pixel((x + by) as u32, y).0[0])).powi(2)
+        });
+        let (sum, count) = differences.fold((0.0, 0), |(sum, count), d| (sum + d, count + 1));
+        sum / f64::from(count)
+    };
+    let best = |a, b| (-12..=12).min_by(|p, q| fit(a, b, *p).total_cmp(&fit(a, b, *q))).expect("some");
+    let moved = best(&pictures[0], &pictures[2]);
+    assert!(moved > 0, "from the leftmost to the rightmost place the room moves by {moved} pixels to the right");
+
+    let print = ["print", "seq", "--plate", "gray.toml", "-o", "stereogram"];
+    refused(f, &print, "--view-spacing");
+    refused(f, &[&print[..], &["--view-spacing", "1mm", "--view-rows", "2"]].concat(), "do not divide the 3 pictures");
+    refused(f, &["print", "points.ply", "--plate", "gray.toml", "--view-rows", "2", "-o", "x"], "view-rows");
+    let spaced = [&print[..], &["--view-spacing", "1mm", "--view-height", "1mm"]].concat();
+    assert!(done(f, &spaced)["complete"] == true);
+    done(f, &["print", "verify", "stereogram"]);
+    assert_eq!(done(f, &spaced)["done"]["computed"], 0, "it is whole");
+    refused(f, &[&print[..], &["--view-spacing", "2mm", "--view-height", "1mm"]].concat(), "spacing is 0.001 there");
+    done(f, &["print", "sheet", "stereogram", "-o", "sheet.html"]);
+    let sheet = fs::read_to_string(f.join("sheet.html")).expect("sheet");
+    assert!(sheet.contains("print seq --plate") && sheet.contains("--view-spacing 1mm"), "the command that makes it");
+}
+
 /// Python with a module, if it is there.
 fn python(module: &str) -> Option<&'static str> {
     let found = Command::new("python3").args(["-c", &format!("import numpy, {module}")]).output();

@@ -124,7 +124,7 @@ pub(crate) enum Command {
     ///
     /// Pinhole views at most 0.5 mm apart over the box and the pupil. `show` and `encode --encoding view` take it.
     #[command(
-        after_long_help = "Examples:\n  holodrive views cornell -o cornell.npz\n  holodrive views room.glb --eye-box 10mm -o room.npz\n  holodrive views points.ply -o views/"
+        after_long_help = "Examples:\n  holodrive views cornell -o cornell.npz\n  holodrive views room.glb --eye-box 10mm -o room.npz\n  holodrive views room.glb --sequence 1280 --eye-box 300mm -o sequence\n  holodrive views points.ply -o views/"
     )]
     Views(ViewsArgs),
     /// Compute the field of a scene, point cloud, or picture with depth on the panel.

@@ -41,6 +41,9 @@ pub(crate) struct PrintArgs {
     /// Where the points of a scene stand, and in which phases, in place of the plate's own.
     #[arg(long, value_parser = one_of::<PointPhase>(), value_name = "PHASE")]
     pub(crate) phase: Option<PointPhase>,
+    /// Side of a segment in place of the plate's own: of views it is a pixel of their pictures [px].
+    #[arg(long, value_name = "N")]
+    pub(crate) segment: Option<u64>,
     /// Picture with a depth map: z of its nearest point, behind is negative [default: three quarters of the plate's distance].
     #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) near: Option<f64>,

@@ -28,7 +28,7 @@ use crate::light_field::{LightField, Look, Pupil, Retina, Viewer};
 use crate::panel::{EncodingRecord, Illumination, Modulation, Pattern, PhasePattern, Setup, drive};
 use crate::progress::Progress;
 use crate::random::Random;
-use descent::{Descent, Found, Looks, Problem, Sight};
+use descent::{Descent, Found, Looks, Problem, Sight, Start};
 use glam::DVec2;
 use optics::{Columns, Optics};
 use pupils::Pupils;
@@ -134,7 +134,9 @@ const BOX_LOOKS: usize = 16;
 
 impl ViewEncoding {
     /// Finds `count` frames that show the target when they follow each other faster than an eye sees, from the phases
-    /// `start` where there are some: those of frames shown before ([`Viewed::wishes`]), for another eye [`carried_over`].
+    /// `start` where there are some: those of frames shown before ([`Viewed::wishes`]), for another eye [`carried_over`]. They help where
+    /// what is seen has moved by little: where others are better (26 dB and less say that it may be so), these are taken, and as many
+    /// steps made as from nothing.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a panel that modulates amplitude, phases that do not fit, light that is dark;
@@ -161,34 +163,34 @@ impl ViewEncoding {
         let steps = self.steps(target.viewer);
         let steps = if start.is_some() && self.iterations.is_none() { steps / 3 } else { steps };
         let own = Self { iterations: Some(steps), ..self.clone() };
-        let is_new = start.is_none();
-        let mut wishes = match start {
-            Some(start) if start.len() == count && start.iter().all(|w| w.len() == model.grid.len()) => start,
-            Some(_) => return Err(Error::parameter("start", "its phases do not fit the frames")),
-            None => {
-                let Spots(spots) = Spots::new(target.viewer, target.retina, count);
-                let of = |(index, spots): (usize, &Vec<DVec2>)| {
-                    let random = &mut Random::new(self.seed ^ 0x5907, index as u64);
-                    converging(target, &targets, &model, spots, random, progress)
-                };
-                spots.iter().enumerate().map(of).collect::<Result<_>>()?
-            }
+        let anew = || -> Result<Vec<Vec<f32>>> {
+            let Spots(spots) = Spots::new(target.viewer, target.retina, count);
+            let of = |(index, spots): (usize, &Vec<DVec2>)| {
+                let random = &mut Random::new(self.seed ^ 0x5907, index as u64);
+                let mut wishes = converging(target, &targets, &model, spots, random, progress)?;
+                model.lit(&mut wishes);
+                Ok(wishes)
+            };
+            spots.iter().enumerate().map(of).collect()
         };
-        if is_new {
-            wishes.iter_mut().for_each(|wishes| model.lit(wishes));
-        }
+        let start = match start {
+            Some(start) if start.len() == count && start.iter().all(|w| w.len() == model.grid.len()) => {
+                Start { wishes: start, others: Some((&anew, self.steps(target.viewer))) }
+            }
+            Some(_) => return Err(Error::parameter("start", "its phases do not fit the frames")),
+            None => Start { wishes: anew()?, others: None },
+        };
         let stepping = Instant::now();
-        let iterations = steps;
         let (found, efficiency) = if target.retina.pupil.is_finite() {
             let optics = Optics::new(&model.grid, target.retina, target.wavelength);
-            let found =
-                own.descend(&Pupils { optics: &optics, targets: &targets }, wishes, target, &model, progress)?;
+            let found = own.descend(&Pupils { optics: &optics, targets: &targets }, start, target, &model, progress)?;
             let efficiency = efficiency(target, &optics, &model, &found.wishes);
             (found, efficiency)
         } else {
             let planes = Planes::new(&targets, target)?;
-            (own.descend(&planes, wishes, target, &model, progress)?, 1.0)
+            (own.descend(&planes, start, target, &model, progress)?, 1.0)
         };
+        let iterations = found.iterations;
         let step_seconds = stepping.elapsed().as_secs_f64() / iterations.max(1) as f64;
         let history: Vec<f64> = found.history.iter().map(|loss| -10.0 * loss.max(1e-30).log10()).collect();
         let frame = |wishes: &Vec<f32>| -> Result<Encoded> {
@@ -233,7 +235,7 @@ impl ViewEncoding {
     fn descend<S: Sight>(
         &self,
         sight: &S,
-        start: Vec<Vec<f32>>,
+        start: Start<'_>,
         target: &ViewTarget,
         model: &PanelModel,
         progress: &Progress,

@@ -5,7 +5,7 @@
 //! the focus and blurred by the pupil's diffraction. Encodings that are optimised for an eye share no code with this.
 //!
 //! ```
-//! use glam::{DVec2, DVec3};
+//! use holodrive::glam::{DVec2, DVec3};
 //! use holodrive::field::{Complex32, Field, Grid};
 //! use holodrive::light_field::{EyeGrid, Layer, LightField, Viewer};
 //! use holodrive::progress::Progress;
