@@ -23,16 +23,27 @@ const LONGEST_TIME: f64 = 3600.0;
 const HIGHEST_RATE: f64 = 1e9;
 
 impl PanelProfile {
-    /// Refuses fields that were set to what no panel has: what reads profiles, and whatever computes with one, asks this.
+    /// Refuses fields that were set to what no panel has; whatever computes with a profile asks this. Whether levels fit into the video
+    /// signal counts where they are packed for one.
     ///
     /// # Errors
     /// [`Error::Parameter`], which names the first.
     pub fn checked(&self) -> Result<(), Error> {
-        self.check().map_err(|what| Error::parameter("panel", format!("{}: {what}", self.name)))
+        self.check_light().map_err(|what| Error::parameter("panel", format!("{}: {what}", self.name)))
     }
 
     /// The first number outside its domain, in words.
     pub(super) fn check(&self) -> Result<(), String> {
+        self.check_light()?;
+        let signal = [self.signal.width, self.signal.height, self.signal.column_offset, self.signal.row_offset];
+        if signal.iter().any(|&side| side > 4 * LONGEST) {
+            return Err(format!("the signal's sides must be at most {} each", 4 * LONGEST));
+        }
+        self.signal.check(self.width, self.height, self.bits)
+    }
+
+    /// The same of what light does, without the video signal.
+    fn check_light(&self) -> Result<(), String> {
         let (width, height, bits) = (self.width, self.height, self.bits);
         if !(1..=LONGEST).contains(&width) || !(1..=LONGEST).contains(&height) {
             return Err(format!("width × height = {width}×{height} must be 1 … {LONGEST} each"));
@@ -88,11 +99,7 @@ impl PanelProfile {
             }
             response.curve.check(self.levels(), &self.source).map_err(|e| e.to_string())?;
         }
-        let signal = [self.signal.width, self.signal.height, self.signal.column_offset, self.signal.row_offset];
-        if signal.iter().any(|&side| side > 4 * LONGEST) {
-            return Err(format!("the signal's sides must be at most {} each", 4 * LONGEST));
-        }
-        self.signal.check(width, height, bits)
+        Ok(())
     }
 }
 
@@ -151,5 +158,59 @@ mod tests {
             let metadata = FrameMetadata { wavelength, ..FrameMetadata::new(&right(), 532e-9) };
             assert!(metadata.check().expect_err("wavelength").contains("wavelength"));
         }
+    }
+
+    #[test]
+    fn fields_that_were_set_afterwards_are_refused_where_a_panel_is_used() {
+        use crate::field::{Complex32, Field};
+        use crate::panel::simulated::{Simulation, simulate};
+        use crate::panel::{Frame, Pattern, PhasePattern, Setup, drive};
+        use crate::progress::Progress;
+        let right = || PanelProfile::phase(40, 24, 8e-6, 8, 532e-9).expect("profile");
+        let frame = Frame::new(&right(), 532e-9, vec![7; 40 * 24]).expect("frame");
+        let light = |frame: &Frame| simulate(frame, &Simulation::default(), &Progress::new());
+        let pattern = || {
+            let grid = right().grid().expect("grid");
+            Pattern::Phase(PhasePattern::new(grid, 532e-9, vec![0.0; 40 * 24]).expect("pattern"))
+        };
+        type Spoil = fn(&mut PanelProfile);
+        let wrong: [(&str, Spoil); 5] = [
+            ("fill_factor", |p| p.fill_factor = f64::NAN),
+            ("fill_factor", |p| p.fill_factor = 93.0),
+            ("a wavelength and a response", |p| p.wavelengths.clear()),
+            ("bits", |p| p.bits = 40),
+            ("dead_space", |p| p.dead_space = -1.0),
+        ];
+        for (word, spoil) in wrong {
+            let mut profile = right();
+            spoil(&mut profile);
+            let mut shown = frame.clone();
+            shown.metadata.panel = profile.clone();
+            let said = [
+                Setup::new(profile.clone(), None).map(drop),
+                drive(&pattern(), None, &profile).map(drop),
+                light(&shown).map(drop),
+            ];
+            for said in said {
+                let said = said.expect_err(word).to_string();
+                assert!(said.contains(word) && !said.contains('\n'), "{word}: {said}");
+            }
+        }
+        // Levels that do not fit, wavelengths in nanometres, samples and colours of another number.
+        let path = std::env::temp_dir().join("holodrive-never-written.png");
+        let mut high = frame.clone();
+        high.levels[3] = 999;
+        assert!(high.write(&path).expect_err("999").to_string().contains("level 999 at column 3") && !path.exists());
+        high.levels.truncate(5);
+        assert!(high.write(&path).expect_err("5").to_string().contains("5 levels for 40×24"));
+        assert!(
+            Frame::new(&right(), 532.0, vec![7; 40 * 24]).expect_err("nm").to_string().contains("look at its unit")
+        );
+        let short =
+            Field { samples: vec![Complex32::default(); 9], ..Field::zeros(right().grid().expect("grid"), 532e-9) };
+        let setup = Setup::new(right(), None).expect("setup");
+        let refused = crate::propagation::propagate(&short, 0.1, &Progress::new()).expect_err("9 samples").to_string();
+        assert!(refused.contains("9 samples for a grid of 40×24"), "{refused}");
+        assert!(crate::field::grid::light(setup.wavelength * 1e9).is_err());
     }
 }

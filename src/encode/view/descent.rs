@@ -110,12 +110,15 @@ pub(super) struct Found {
     pub(super) iterations: usize,
 }
 
+/// Makes wishes of each frame.
+pub(super) type Wishes<'a> = &'a dyn Fn() -> Result<Vec<Vec<f32>>>;
+
 /// What a descent begins with.
 pub(super) struct Start<'a> {
     /// Wishes of each frame.
     pub(super) wishes: Vec<Vec<f32>>,
     /// Makes others, and how many steps from these, where the given ones are so bad that others may be better.
-    pub(super) others: Option<(&'a dyn Fn() -> Result<Vec<Vec<f32>>>, usize)>,
+    pub(super) others: Option<(Wishes<'a>, usize)>,
 }
 
 /// Loss of given wishes above which others are looked at, too: 26 dB. What moved by little begins well above that, and others take two
