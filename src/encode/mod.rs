@@ -150,7 +150,7 @@ pub struct EncodeReport {
     pub efficiency: f64,
     /// Relative error of the field within the encoding's band after the best complex factor: √(1 − |⟨u, g⟩|²/(⟨u, u⟩
     /// ⟨g, g⟩)). It covers the border too, where the sharp band rings. NaN for frames that are made for an eye: they have no wanted
-    /// field, see [`ViewReport::psnr`].
+    /// field, see [`view::ViewReport::psnr`].
     pub field_error: f64,
     /// Share of samples whose amplitude passed the normalisation and was clipped.
     pub clipped: f64,

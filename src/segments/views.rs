@@ -46,7 +46,7 @@ pub(crate) fn lattice(plane: &Segments) -> Result<Grid> {
 }
 
 impl PlacedViews {
-    /// Views whose window is a plane's [`lattice`]; those of one row are seen over `height` [m], by default a tenth of their distance.
+    /// Views whose window has a pixel for each of a plane's segments; those of one row are seen over `height` [m], by default a tenth of their distance.
     ///
     /// # Errors
     /// [`Error::Parameter`] for views that are dark or stand in no place, for a plane with a slit, and where a segment would send light to
