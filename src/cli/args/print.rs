@@ -42,7 +42,7 @@ pub(crate) struct PrintArgs {
     #[arg(long, value_parser = one_of::<PointPhase>(), value_name = "PHASE")]
     pub(crate) phase: Option<PointPhase>,
     /// Side of a segment in place of the plate's own: of views it is a pixel of their pictures [px].
-    #[arg(long, value_name = "N")]
+    #[arg(hide_short_help = true, long, value_name = "N")]
     pub(crate) segment: Option<u64>,
     /// Picture with a depth map: z of its nearest point, behind is negative [default: three quarters of the plate's distance].
     #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
@@ -50,8 +50,6 @@ pub(crate) struct PrintArgs {
     /// Picture with a depth map: z of its farthest point [default: five quarters of the plate's distance].
     #[arg(long, value_parser = units::length, value_name = "LENGTH", allow_hyphen_values = true)]
     pub(crate) far: Option<f64>,
-    #[command(flatten)]
-    pub(crate) map: DepthMapArgs,
     /// Folder of views: how far apart the places of neighbouring ones are.
     #[arg(long, value_parser = units::length, value_name = "LENGTH")]
     pub(crate) view_spacing: Option<f64>,
@@ -61,6 +59,8 @@ pub(crate) struct PrintArgs {
     /// Views in one row: the height from which they are seen [default: a tenth of their distance].
     #[arg(hide_short_help = true, long, value_parser = units::length, value_name = "LENGTH")]
     pub(crate) view_height: Option<f64>,
+    #[command(flatten)]
+    pub(crate) map: DepthMapArgs,
     /// Folder for the plate. One that was begun with the same settings is gone on with; one of others is refused.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
