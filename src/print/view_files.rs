@@ -72,7 +72,27 @@ impl ViewFiles {
             return Err(Error::input(&self.path, "holds no pictures (.png, .jpg, .bmp, .tif)"));
         }
         found.sort_by_cached_key(|path| counted(&name(path)));
+        self.check_sequence(found.len())?;
         Ok(found)
+    }
+
+    /// Refuses a folder in which a longer sequence stood before the one of its `sequence.json`: its last pictures are still there.
+    fn check_sequence(&self, count: usize) -> Result<()> {
+        #[derive(Deserialize)]
+        struct Told {
+            views: usize,
+        }
+        let told = self.path.join("sequence.json");
+        // A file of this name that says something else is another program's.
+        let text = std::fs::read(&told).unwrap_or_default();
+        match serde_json::from_slice::<Told>(&text) {
+            Ok(Told { views }) if views != count && !self.is_light_field() => {
+                let what =
+                    format!("says {views} views, and {count} pictures are there; take away those of another sequence");
+                Err(Error::input(told, what))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The views before a plate, a pixel of each for each of its segments.
@@ -291,6 +311,9 @@ mod tests {
         };
         assert!(said(ViewReading::default()).contains("holds no pictures"));
         write_views(&views);
+        std::fs::write(views.join("sequence.json"), r#"{"views": 2}"#).expect("json");
+        assert!(said(ViewReading::default()).contains("sequence.json: says 2 views, and 3 pictures"));
+        std::fs::write(views.join("sequence.json"), r#"{"views": 3}"#).expect("json");
         assert!(said(ViewReading::default()).contains("--view-spacing"));
         let far = ViewReading { spacing: Some(2e-3), ..ViewReading::default() };
         assert!(said(ViewReading { rows: Some(2), ..far.clone() }).contains("2 do not divide the 3 pictures"));

@@ -53,6 +53,16 @@ def served(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.M
         yield running
 
 
+def shown_levels(folder: Path) -> "list[int]":
+    """The level of each frame that the simulated panel has shown, after the idle one; all of its pixels have it."""
+    levels = []
+    for path in sorted(folder.glob("frame-*.png"))[1:]:
+        frame = hd.Frame.load(path).levels
+        assert (frame == frame[0, 0]).all()
+        levels.append(int(frame[0, 0]))
+    return levels
+
+
 def sphere(
     panel: hd.Panel, place: "tuple[float, float, float]", wavelength: float
 ) -> "np.ndarray[tuple[int, int], np.dtype[np.complex128]]":

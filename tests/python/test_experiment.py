@@ -14,7 +14,7 @@ from typing import Callable
 import holodrive as hd
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, shown_levels
 from numpy.typing import NDArray
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the tests tell times by a clock that programs have in common")
@@ -22,16 +22,6 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the tests tell 
 
 def flat(slm: hd.SLM, level: int) -> "NDArray[np.uint8]":
     return np.full(slm.shape, level, np.uint8)
-
-
-def shown_levels(folder: Path) -> "list[int]":
-    """The level of each frame that the simulated panel has shown, after the idle one; all of its pixels have it."""
-    levels = []
-    for path in sorted(folder.glob("frame-*.png"))[1:]:
-        frame = hd.Frame.load(path).levels
-        assert (frame == frame[0, 0]).all()
-        levels.append(int(frame[0, 0]))
-    return levels
 
 
 def test_preloaded_frames_are_shown_by_name_played_and_forgotten(served: hd.Served, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from typing import Iterator
 import holodrive as hd
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, shown_levels
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the tests tell times by a clock that programs have in common")
 
@@ -35,16 +35,6 @@ def two(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> "Iterator[tuple[hd.S
     yield served[0], served[1]
     for one in served:
         one.stop()
-
-
-def shown_levels(folder: Path) -> "list[int]":
-    """The level of each frame that a simulated panel has shown, after the idle one; all of its pixels have it."""
-    levels = []
-    for path in sorted(folder.glob("frame-*.png"))[1:]:
-        frame = hd.Frame.load(path).levels
-        assert (frame == frame[0, 0]).all()
-        levels.append(int(frame[0, 0]))
-    return levels
 
 
 def flat(level: int, name: str) -> "np.ndarray[tuple[int, int], np.dtype[np.uint16]]":

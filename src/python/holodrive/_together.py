@@ -8,6 +8,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Callable, Iterable, List, NamedTuple, Optional, Sequence, Tuple, Type, Union
 
+import numpy as np
+
 from ._errors import DisplayError, refused
 from ._serve import Served
 from .slm import SLM, Shown
@@ -90,6 +92,8 @@ class Bench:
         self._one_each(frames)
 
         def ready(slm: SLM, frame: Any) -> "Optional[Union[str, int]]":
+            if isinstance(frame, np.integer):
+                return int(frame)
             if frame is None or isinstance(frame, (str, int)):
                 return frame
             slm.preload(self._ready, frame)
